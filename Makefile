@@ -1,0 +1,171 @@
+# hullguard. Everything that is built goes to $(BUILD); sources are found by wildcards, so that a new file needs no line here.
+# V=1 shows the commands. A folder may add targets of its own in a *.mk file (see the include at the end), and parts of `make test` by
+# TEST_PARTS += NAME. A target with a ## comment shows up in `make help`.
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules --no-print-directory
+
+BUILD := build
+CC    := gcc
+CLANG := clang-19
+AR    := ar
+PY    := .venv/bin/python
+Q     := $(if $(V),,@)
+
+# --- flags ---------------------------------------------------------------------------------------------------------------------------
+
+WARN := -std=c11 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wstrict-prototypes \
+        -Wmissing-prototypes -Wshadow -Wcast-align -Wvla -Wundef -Wswitch-enum -ffp-contract=off -Werror
+INCLUDE  := -Ifirmware/include -Ifirmware/models -Ihal
+OPTIMISE := -O2 -g
+DEPEND    = -MMD -MP
+SANITIZE := -O1 -g -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=undefined
+
+# The number types the library is built for on the host, and the tool sets every test is built with.
+REALS := f32 f64
+REAL_FLAG_f32 := -DHG_REAL_F32=1
+REAL_FLAG_f64 := -DHG_REAL_F64=1
+TOOLSETS := gcc asan clang
+CC_gcc     = $(CC) $(OPTIMISE)
+CC_asan    = $(CC) $(SANITIZE),address
+CC_clang   = $(CLANG) $(OPTIMISE)
+
+LIB_SRC     := $(wildcard firmware/src/*.c)
+MODEL_SRC   := $(wildcard firmware/models/*.c)
+CORE_SRC    := $(wildcard host_tools/hullguard/core/*.c)
+HOST_HAL    := loopback socketcan
+HOST_HAL_SRC := $(foreach h,$(HOST_HAL),$(wildcard hal/$(h)/*.c))
+UNIT_TESTS  := $(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c))
+UNIT_DATA   := $(wildcard tests/fixtures/*)
+RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig_*.c))
+
+OBJECTS :=
+TEST_PARTS := lib
+
+# --- what to run ---------------------------------------------------------------------------------------------------------------------
+
+.PHONY: help
+help: ## what make can do
+	@awk 'BEGIN { FS = ":.*## " } /^[a-z0-9_-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+.PHONY: setup-demo setup-test
+setup-demo: ## system packages and .venv for the demo (apt where it is, nothing when all is there)
+	@host_tools/setup.sh demo
+setup-test: ## the same for the tests
+	@host_tools/setup.sh test
+
+# The parts start after the set-up, in a make of their own, because they may need what it installs.
+.PHONY: test
+test: ## set up all that is needed, build, run every test
+	@host_tools/setup.sh test
+	@$(MAKE) $(if $(filter --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc)) -Otarget $(TEST_PARTS)
+	@echo "all tests passed: $(TEST_PARTS)"
+
+.PHONY: clean
+clean: ## remove what was built (not .venv)
+	rm -rf $(BUILD)
+
+# --- compiling -----------------------------------------------------------------------------------------------------------------------
+
+# $(call objects,FOLDER,SOURCES,COMMAND): rules for the objects of SOURCES under FOLDER, compiled by COMMAND.
+define objects
+OBJECTS += $(2:%.c=$(1)/%.o)
+$(2:%.c=$(1)/%.o): $(1)/%.o: %.c Makefile
+	@mkdir -p $$(@D)
+	$$(Q)$(3) $$(WARN) $$(INCLUDE) $$(DEPEND) -c $$< -o $$@
+endef
+
+# $(call archive,FILE,FOLDER,SOURCES)
+define archive
+$(1): $(3:%.c=$(2)/%.o)
+	@mkdir -p $$(@D)
+	@rm -f $$@
+	$$(Q)$$(AR) rcs $$@ $$^
+endef
+
+# --- the library on the host ---------------------------------------------------------------------------------------------------------
+
+SHARED_LIBS := $(REALS:%=$(BUILD)/lib/libhullguard_%.so)
+STATIC_LIB  := $(BUILD)/lib/libhullguard_f32.a
+
+.PHONY: lib
+lib: $(SHARED_LIBS) $(STATIC_LIB) ## the C library for the host: build/lib/libhullguard_{f32,f64}.so and libhullguard_f32.a
+
+define shared_lib
+$(eval $(call objects,$(BUILD)/shared-$(1),$(LIB_SRC) $(CORE_SRC),$$(CC) $$(OPTIMISE) -fPIC $(REAL_FLAG_$(1))))
+$(BUILD)/lib/libhullguard_$(1).so: $(patsubst %.c,$(BUILD)/shared-$(1)/%.o,$(LIB_SRC) $(CORE_SRC))
+	@mkdir -p $$(@D)
+	$$(Q)$$(CC) -shared -Wl,--no-undefined -o $$@ $$^ -lm
+endef
+$(foreach r,$(REALS),$(eval $(call shared_lib,$(r))))
+
+$(eval $(call objects,$(BUILD)/static-f32,$(LIB_SRC),$$(CC) $$(OPTIMISE) $(REAL_FLAG_f32)))
+$(eval $(call archive,$(STATIC_LIB),$(BUILD)/static-f32,$(LIB_SRC)))
+
+# --- unit tests: tests/unit/test_X.c, one program each, with every tool set and number type -------------------------------------------
+
+.PHONY: unit
+unit: ## unit tests (CMocka) with gcc, gcc + ASan + UBSan, clang; f32 and f64
+TEST_PARTS += unit
+
+# A test whose program has not changed since it passed is not run again; its output is beside it, in .log.
+run_test = timeout --foreground -k 5 300 $(1) >$(2).log 2>&1 && touch $(2).ok && echo "  ok  $(2)" \
+           || { cat $(2).log; echo "FAILED $(2)"; exit 1; }
+
+define unit_variant
+$(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(LIB_SRC) $(MODEL_SRC) $(HOST_HAL_SRC),$$(CC_$(1)) $(REAL_FLAG_$(2))))
+$(eval $(call archive,$(BUILD)/unit/$(1)-$(2)/libhullguard.a,$(BUILD)/unit/$(1)-$(2),$(LIB_SRC) $(MODEL_SRC) $(HOST_HAL_SRC)))
+$(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(UNIT_TESTS:%=tests/unit/%.c),$$(CC_$(1)) $(REAL_FLAG_$(2))))
+$(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%): %: $(BUILD)/unit/$(1)-$(2)/libhullguard.a
+$(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%): $(BUILD)/unit/$(1)-$(2)/%: $(BUILD)/unit/$(1)-$(2)/tests/unit/%.o
+	$$(Q)$$(CC_$(1)) -o $$@ $$< $(BUILD)/unit/$(1)-$(2)/libhullguard.a -lcmocka -lm
+$(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%.ok): %.ok: % $(UNIT_DATA)
+	@$$(call run_test,$$<,$$*)
+unit: $(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%.ok)
+endef
+$(foreach t,$(TOOLSETS),$(foreach r,$(REALS),$(eval $(call unit_variant,$(t),$(r)))))
+
+# --- with-vcan: a CAN bus on machines whose kernel has none ----------------------------------------------------------------------------
+
+WITH_VCAN := $(BUILD)/with-vcan/with-vcan
+
+.PHONY: with-vcan
+with-vcan: $(WITH_VCAN) ## build/with-vcan/with-vcan CMD: run CMD where vcan0 exists
+$(WITH_VCAN): tests/with-vcan/with-vcan $(BUILD)/with-vcan/with-vcan-init
+	@mkdir -p $(@D)
+	$(Q)cp $< $@
+$(BUILD)/with-vcan/with-vcan-init: tests/with-vcan/with-vcan-init.c Makefile
+	@mkdir -p $(@D)
+	$(Q)$(CC) $(WARN) -O2 -static -o $@ $<
+
+# --- contract tests: tests/contract/contract.c against every backend that has a rig_X.c ------------------------------------------------
+
+.PHONY: contract
+contract: ## one suite for every HAL backend: loopback, and SocketCAN under with-vcan
+TEST_PARTS += contract
+
+# How a rig is started; nothing: directly. AddressSanitizer's shadow does not fit into the 512 GB that a process has in User-Mode Linux,
+# so there the sanitized program has UBSan only, and valgrind watches the memory.
+CONTRACT_START_socketcan = $(WITH_VCAN) -t 120 $(if $(filter asan,$(1)),valgrind -q --error-exitcode=9 --child-silent-after-fork=yes)
+CONTRACT_NEEDS_socketcan = $(WITH_VCAN)
+CONTRACT_CC_asan_socketcan = $(CC) $(SANITIZE)
+
+# $(call contract_program,TOOLSET,RIG)
+contract_src = tests/contract/contract.c tests/contract/rig_$(1).c $(wildcard hal/$(1)/*.c)
+contract_cc  = $(or $(CONTRACT_CC_$(1)_$(2)),$(CC_$(1)))
+define contract_program
+$(eval $(call objects,$(BUILD)/contract/$(1)/$(2),$(call contract_src,$(2)),$$(call contract_cc,$(1),$(2))))
+$(BUILD)/contract/$(1)/$(2)/contract: $(patsubst %.c,$(BUILD)/contract/$(1)/$(2)/%.o,$(call contract_src,$(2)))
+	$$(Q)$$(call contract_cc,$(1),$(2)) -o $$@ $$^ -lcmocka
+$(BUILD)/contract/$(1)/$(2)/contract.ok: $(BUILD)/contract/$(1)/$(2)/contract $(CONTRACT_NEEDS_$(2))
+	@$$(call run_test,$$(call CONTRACT_START_$(2),$(1)) $$<,$$<)
+contract: $(BUILD)/contract/$(1)/$(2)/contract.ok
+endef
+$(foreach t,$(TOOLSETS),$(foreach r,$(RIGS),$(eval $(call contract_program,$(t),$(r)))))
+
+# --- parts of other folders --------------------------------------------------------------------------------------------------------------
+
+include $(wildcard firmware/*.mk hal/*.mk hal/*/*.mk host_tools/*.mk tests/*.mk tests/*/*.mk)
+-include $(OBJECTS:.o=.d)

@@ -1,0 +1,54 @@
+/** @file
+ *  Compile-time options. Define HG_CONFIG_HEADER to a quoted header name to set them in one place of your own.
+ *  None of them changes an equation; they bound what a model may ask for and choose the number type. */
+#ifndef HULLGUARD_CONFIG_H
+#define HULLGUARD_CONFIG_H
+
+#ifdef HG_CONFIG_HEADER
+#include HG_CONFIG_HEADER
+#endif
+
+/* Number type of every signal, radius and table: exactly one of the two is 1. float32 is the default; float64 is for host studies. */
+#ifndef HG_REAL_F64
+#define HG_REAL_F64 0
+#endif
+#ifndef HG_REAL_F32
+#define HG_REAL_F32 (1 - HG_REAL_F64)
+#endif
+#if (HG_REAL_F32 + HG_REAL_F64) != 1
+#error "choose exactly one number type: HG_REAL_F32 or HG_REAL_F64"
+#endif
+
+/* Senders of one model, the closing one included. The verdict frame has two bits of bus health for each: at most 8. */
+#ifndef HG_GROUPS_MAX
+#define HG_GROUPS_MAX 8U
+#endif
+#if (HG_GROUPS_MAX < 1U) || (HG_GROUPS_MAX > 8U)
+#error "HG_GROUPS_MAX: 1 .. 8"
+#endif
+
+/* Signals in one frame. Bounds two local arrays of 4 bytes each; a 64-byte FD frame seldom holds more than 31 of 16 bits. */
+#ifndef HG_GROUP_SIGNALS_MAX
+#define HG_GROUP_SIGNALS_MAX 32U
+#endif
+#if (HG_GROUP_SIGNALS_MAX < 1U) || (HG_GROUP_SIGNALS_MAX > 255U)
+#error "HG_GROUP_SIGNALS_MAX: 1 .. 255"
+#endif
+
+/* Levels of the adaptive trigger. */
+#ifndef HG_LEVELS_MAX
+#define HG_LEVELS_MAX 8U
+#endif
+#if (HG_LEVELS_MAX < 1U) || (HG_LEVELS_MAX > 255U)
+#error "HG_LEVELS_MAX: 1 .. 255"
+#endif
+
+/* Residual generators in one detector; their alarms are bits of one 32-bit word. */
+#ifndef HG_GENERATORS_MAX
+#define HG_GENERATORS_MAX 32U
+#endif
+#if (HG_GENERATORS_MAX < 1U) || (HG_GENERATORS_MAX > 32U)
+#error "HG_GENERATORS_MAX: 1 .. 32"
+#endif
+
+#endif

@@ -1,0 +1,100 @@
+/** @file
+ *  The threshold: the exact interval hull of what a residual can be without a fault (methods, platoon, section 6). For a linear generator
+ *  it is a sum of absolute impulse responses over the radii of its signals,
+ *
+ *      J_i(k) = bias_i(k) + sum over lags j < taps of |h_i(j)| radius(k - j) + tail_i(k)
+ *
+ *  bias: initial state (two tables: started at rest, or in a moving plant), disturbances and all rounding; offline, its last row holds for good.
+ *  tail: what lies behind the taps, from above:  theta(k) = decay theta(k-1) + max_g tail_input_g radius_g(k - taps), tail_i = tail_output_i theta;
+ *  it heals as fast as the generator forgets and never keeps a maximum. All tables are rounded so that J is never below the exact hull.
+ *  One ring of past radii (hg_radii) serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
+ *  because J is linear in the radii. Not reentrant per instance; safe in interrupt context; no allocation. */
+#ifndef HULLGUARD_HULL_H
+#define HULLGUARD_HULL_H
+
+#include "hullguard/real.h"
+#include "hullguard/status.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {        /* RAM: one a detector */
+    hg_real *data;      /* [length][width] */
+    uint8_t  width;     /* signals of the model, 1 .. 255 */
+    uint8_t  length;    /* samples kept, the newest included, 1 .. 255 */
+    uint8_t  newest;    /* row of the newest sample */
+} hg_radii;
+
+/** Memory of a ring, numbers. */
+#define HG_RADII_REALS(width, length) ((uint32_t)(width) * (uint32_t)(length))
+
+/** Begin with all radii 0: the past before the first sample is the initial state's business.
+ *  @retval HG_OK          ready
+ *  @retval HG_E_ARGUMENT  a null pointer, or width or length 0 */
+hg_status hg_radii_start(hg_radii *self, uint8_t width, uint8_t length, hg_real *memory);
+
+/** Forget all: every radius 0. */
+void hg_radii_reset(hg_radii *self);
+
+/** Enter the radii of a new sample.
+ *  @param[in] radius  [width] finite, >= 0
+ *  @retval HG_OK         entered
+ *  @retval HG_E_NUMERIC  a radius is negative or not finite; nothing changed */
+hg_status hg_radii_push(hg_radii *self, const hg_real *radius);
+
+/** Overwrite the radii of some signals at a past sample.
+ *  @param[in] lag     samples before the newest, 1 .. length - 1; more is ignored (the tail already holds it)
+ *  @param[in] first   first signal  @param[in] count  signals from there
+ *  @param[in] radius  [count] finite, >= 0 */
+void hg_radii_rewrite(hg_radii *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *radius);
+
+typedef struct {                 /* flash: one a generator, generated */
+    uint8_t        residuals;    /* 1 .. 255 */
+    uint8_t        width;        /* signals read, 1 .. 255 */
+    const uint8_t *signal;       /* [width] their places in the ring's rows */
+    uint8_t        taps;         /* 1 .. ring length - 1 */
+    const hg_real *weight;       /* [taps][residuals][width] >= 0, lag 0 first */
+    uint16_t       settle;       /* rows of the bias tables, >= 1 */
+    const hg_real *rest;         /* [settle][residuals] bias after a start within the initial range */
+    const hg_real *moving;       /* [settle][residuals] bias after a start anywhere in the state range */
+    uint16_t       ready_rest;   /* samples until the initial state is a small part of J, after a start at rest */
+    uint16_t       ready_moving; /* the same after a start in a moving plant */
+    hg_real        decay;        /* 0 .. < 1 */
+    const hg_real *tail_input;   /* [width] >= 0 */
+    const hg_real *tail_output;  /* [residuals] >= 0 */
+} hg_hull_config;
+
+/* How the plant may move when a detector starts. The careful choice is the one that zeroed memory holds. */
+typedef enum {
+    HG_START_MOVING = 0, /* anywhere in its operating range: power-up, watchdog reset, after long silence */
+    HG_START_REST   = 1  /* within the model's initial range */
+} hg_start;
+
+typedef struct {                 /* RAM: one a generator */
+    const hg_hull_config *config;
+    hg_real               theta;
+    uint16_t              k;     /* samples since the start, saturated */
+    hg_start              how;
+} hg_hull;
+
+/** Are sizes and tables within the ranges above, for a ring of this width and length? Cost: width comparisons. */
+bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length);
+
+/** Begin at the sample after this call.
+ *  @retval HG_OK          ready
+ *  @retval HG_E_ARGUMENT  a null pointer
+ *  @retval HG_E_CONFIG    hg_hull_valid() says no */
+hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_radii *ring, hg_start how);
+
+/** Begin again. */
+void hg_hull_reset(hg_hull *self, hg_start how);
+
+/** Threshold of this sample, whose radii are the newest row of the ring.
+ *  @param[out] J  [residuals] > 0
+ *  Cost: taps x residuals x width multiplications. */
+void hg_hull_step(hg_hull *self, const hg_radii *ring, hg_real *J);
+
+/** Has the initial state become a small part of J? */
+bool hg_hull_ready(const hg_hull *self);
+
+#endif

@@ -1,0 +1,22 @@
+/** @file
+ *  All of hullguard, in reading order. */
+#ifndef HULLGUARD_H
+#define HULLGUARD_H
+
+#include "hullguard/config.h"
+#include "hullguard/status.h"
+#include "hullguard/real.h"
+#include "hullguard/linalg.h"
+#include "hullguard/code.h"
+#include "hullguard/trigger.h"
+#include "hullguard/hold.h"
+#include "hullguard/residual.h"
+#include "hullguard/hull.h"
+#include "hullguard/decision.h"
+#include "hullguard/detector.h"
+#include "hullguard/e2e.h"
+#include "hullguard/can.h"
+#include "hullguard/frame.h"
+#include "hullguard/node.h"
+
+#endif

@@ -1,0 +1,172 @@
+/** @file
+ *  What runs on an ECU, between a CAN controller and the library: a sender (trigger, codec, protection) and a detector node (protection,
+ *  codec, detector, verdict frames). No clock is read: the detector's time is the closing frame, and an application whose closing frame is
+ *  overdue says so with hg_node_overdue().
+ *
+ *      on every frame:      hg_node_receive(&node, &frame)
+ *      then, and overdue:   while (hg_node_step(&node, &verdict) == HG_OK) { send what hg_node_report() hands out }
+ *
+ *  Stamps. Every frame carries k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated as lost,
+ *  never booked to the wrong sample. A closing frame j <= 7 ahead makes j steps without it first; a late one is counted, and two running
+ *  restart the detector at the sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing frames lost in a row are an outage that only hg_node_overdue() sees.
+ *  Not reentrant per instance. hg_inbox is the one structure that an interrupt may share with the main loop. */
+#ifndef HULLGUARD_NODE_H
+#define HULLGUARD_NODE_H
+
+#include "hullguard/detector.h"
+#include "hullguard/e2e.h"
+#include "hullguard/frame.h"
+
+/* ---- Sender ---- */
+
+typedef struct {                       /* flash: one a group */
+    const hg_message        *message;
+    const hg_trigger_config *trigger;
+} hg_sender_config;
+
+typedef struct {                       /* RAM: one a group */
+    const hg_sender_config *config;
+    hg_trigger              trigger;
+    int32_t                *code;      /* [width] this sample's codes */
+    uint8_t                 counter;   /* of the next frame */
+} hg_sender;
+
+/** Begin before the first sample.
+ *  @param[in] codes  [2 width] memory, owned by the caller
+ *  @retval HG_OK          ready
+ *  @retval HG_E_ARGUMENT  a null pointer
+ *  @retval HG_E_CONFIG    message and trigger contradict each other */
+hg_status hg_sender_start(hg_sender *self, const hg_sender_config *config, int32_t *codes);
+
+/** One sample: encode, ask the trigger, and when it says so lay out a protected frame.
+ *  @param[in]  k      sample index; its low 4 bits become the frame's stamp
+ *  @param[in]  value  [width] signal units; NaN, infinity and out of range are sent as invalid
+ *  @param[out] frame  to be sent now, valid only with HG_OK
+ *  @retval HG_OK       send *frame
+ *  @retval HG_E_EMPTY  silence */
+hg_status hg_sender_step(hg_sender *self, uint32_t k, const hg_real *value, hg_can_frame *frame);
+
+/* ---- Detector node ---- */
+
+typedef struct {                       /* flash: one a model, generated */
+    const hg_detector_config *detector;
+    const hg_message         *message;    /* [groups] */
+    uint8_t                   closing;    /* the group whose frame closes the sample */
+    const hg_message         *verdict;    /* 8 bytes, no fields: the map stands in frame.h */
+    const hg_message         *status;     /* 8 bytes, no fields */
+    uint16_t                  heartbeat;  /* samples between verdict frames when nothing changes, >= 1 */
+    uint32_t                  model_hash;
+} hg_node_config;
+
+typedef struct {            /* what happened on one group's link since the start; every counter saturates */
+    uint16_t good;          /* frames booked */
+    uint16_t lost;          /* by the sequence counter */
+    uint16_t crc;           /* damaged */
+    uint16_t format;        /* wrong length or kind */
+    uint16_t repeated;      /* duplicates */
+    uint16_t early;         /* stamped ahead of the open sample */
+    uint16_t late;          /* stamped behind it */
+    uint16_t numeric;       /* a value neither in range nor marked invalid */
+    uint16_t invalid;       /* frames with a value marked invalid by its sender */
+} hg_link_health;
+
+typedef struct {            /* RAM: one a group */
+    hg_e2e_receiver receiver;
+    hg_link_health  health;
+} hg_link;
+
+typedef struct {            /* the record that the verdict frame carries */
+    uint32_t   k;           /* sample it speaks of */
+    uint32_t   model_hash;
+    uint32_t   candidates;  /* bit i: fault i of the model can explain the alarm */
+    hg_plant   plant;
+    hg_basis   basis;
+    uint16_t   bus;         /* bits 2i+1:2i: hg_bus_health of group i */
+    bool       refused;     /* has a number been refused since the start? */
+} hg_verdict;
+
+typedef struct {                /* RAM: one a node */
+    const hg_node_config *config;
+    hg_detector     detector;
+    hg_link        *link;       /* [groups] */
+    int32_t        *closing;    /* [width of the closing group] codes waiting for their sample */
+    uint32_t        k;          /* the open sample */
+    uint32_t        unknown;    /* frames with an identifier that is not the model's */
+    uint32_t        overdue;    /* samples closed without their closing frame */
+    uint8_t         due;        /* steps to make */
+    bool            held;       /* closing[] waits for the last of them */
+    bool            continues;  /* and its sequence counter continued */
+    bool            synchronised; /* has a closing frame told which sample is open? */
+    bool            slipped;    /* the last closing frame was late */
+    bool            reported;   /* has a verdict frame been handed out? */
+    uint16_t        silence;    /* samples since the last verdict frame that was not a mere reply */
+    hg_verdict      last;       /* the last one of those */
+    uint8_t         verdict_counter;
+    uint8_t         status_counter;
+} hg_node;
+
+typedef struct {                /* owned by the caller; one storage type a model is generated */
+    hg_detector_memory detector;
+    hg_link           *link;    /* [groups] */
+    int32_t           *closing; /* [width of the closing group] */
+} hg_node_memory;
+
+/** Begin before a sample. Sample 0 is open until a closing frame says otherwise.
+ *  @retval HG_OK          ready
+ *  @retval HG_E_ARGUMENT  a null pointer
+ *  @retval HG_E_SIZE      memory shorter than the configuration needs
+ *  @retval HG_E_CONFIG    tables contradict one another */
+hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_node_memory *memory, hg_start how);
+
+/** Take a frame from the bus, whatever it is. Every refusal is counted in the group's link, and a refused or damaged frame of a group counts as lost.
+ *  @retval HG_OK          booked; after the closing frame hg_node_step() has work
+ *  @retval HG_E_ID        not a frame of this model
+ *  @retval HG_E_FORMAT    wrong length or kind
+ *  @retval HG_E_CRC       damaged
+ *  @retval HG_E_REPEATED  a duplicate, or a second frame of the group for the same sample (which then counts as lost)
+ *  @retval HG_E_STAMP     of another sample
+ *  @retval HG_E_NUMERIC   a value out of range
+ *  @retval HG_E_BUSY      steps are due: make them first; nothing changed */
+hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame);
+
+/** The open sample's closing frame has not come in time: the sample is closed without it. */
+void hg_node_overdue(hg_node *self);
+
+/** Make one step that is due.
+ *  @retval HG_OK       *verdict is of the sample just closed
+ *  @retval HG_E_EMPTY  nothing is due */
+hg_status hg_node_step(hg_node *self, hg_verdict *verdict);
+
+/** Frames to send after a step: a verdict frame when plant, candidates, basis or bus changed, and with every heartbeat, which adds a status frame.
+ *  @param[in]  reply  answer this step in any case (lockstep)
+ *  @param[out] frame  [2]
+ *  Result: number of frames, 0 .. 2. */
+uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_can_frame *frame);
+
+/** Read a verdict frame; the other end of the wire. k is known modulo 4096, the model hash is not in it.
+ *  @retval HG_OK  @retval HG_E_FORMAT  @retval HG_E_CRC */
+hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, hg_verdict *verdict, bool *reply);
+
+/** Health of one group's link. @param[in] group  0 .. groups - 1 */
+const hg_link_health *hg_node_health(const hg_node *self, uint8_t group);
+
+/* ---- From a receive interrupt to the main loop ---- */
+
+typedef struct {                    /* RAM; one writer, one reader, no lock: wait-free on one core */
+    hg_can_frame     *frame;        /* [length] */
+    uint8_t           length;       /* a power of two, 2 .. 128 */
+    volatile uint8_t  written;      /* frames put, modulo 256: only the interrupt writes it */
+    volatile uint8_t  read;         /* frames taken, modulo 256: only the main loop writes it */
+    volatile uint16_t overflow;     /* frames that found no room, saturated: only the interrupt writes it */
+} hg_inbox;
+
+/** @retval HG_OK ready  @retval HG_E_ARGUMENT  a null pointer, or length is not a power of two in 2 .. 128 */
+hg_status hg_inbox_start(hg_inbox *self, hg_can_frame *frame, uint8_t length);
+
+/** From the interrupt. @retval HG_OK stored  @retval HG_E_BUSY no room: counted, the frame is lost, and its sequence counter will tell */
+hg_status hg_inbox_put(hg_inbox *self, const hg_can_frame *frame);
+
+/** From the main loop. @retval HG_OK *frame is the oldest  @retval HG_E_EMPTY none */
+hg_status hg_inbox_get(hg_inbox *self, hg_can_frame *frame);
+
+#endif

@@ -1,0 +1,90 @@
+#include "hullguard/decision.h"
+
+#include <stddef.h>
+
+bool hg_decision_exceeds(const hg_real *r, const hg_real *J, uint8_t n)
+{
+    bool exceeds = false;
+    for (uint8_t i = 0U; i < n; i++) {
+        exceeds = exceeds || (!(hg_real_abs(r[i]) <= J[i])); /* written so that NaN is an alarm, never blindness */
+    }
+    return exceeds;
+}
+
+hg_status hg_decision_start(hg_decision *self, const hg_decision_config *config, hg_alarm *alarm)
+{
+    if ((self == NULL) || (config == NULL) || (alarm == NULL)) {
+        return HG_E_ARGUMENT;
+    }
+    if ((config->generators < 1U) || (config->generators > HG_GENERATORS_MAX) || (config->up < 1U) || (config->down < 1U) ||
+        (config->feeds == NULL) || (config->faults == NULL)) {
+        return HG_E_CONFIG;
+    }
+    self->config = config;
+    self->alarm = alarm;
+    hg_decision_reset(self);
+    return HG_OK;
+}
+
+void hg_decision_reset(hg_decision *self)
+{
+    for (uint8_t g = 0U; g < self->config->generators; g++) {
+        self->alarm[g] = (hg_alarm){.state = HG_PLANT_NONE, .up = 0U, .down = 0U, .pending = 0U};
+    }
+}
+
+static uint8_t next(uint8_t counter, uint8_t limit)
+{
+    return (counter < limit) ? (uint8_t)(counter + 1U) : limit;
+}
+
+static void count(hg_alarm *alarm, const hg_decision_config *config, bool raised)
+{
+    if (raised) {
+        alarm->up = next(alarm->up, config->up);
+        alarm->down = 0U;
+    } else {
+        alarm->up = 0U;
+        alarm->down = next(alarm->down, config->down);
+    }
+}
+
+static void alarm_step(hg_alarm *alarm, const hg_decision_config *config, uint8_t feeds, bool raised, const hg_evidence *evidence)
+{
+    if ((alarm->state == HG_PLANT_PROVISIONAL) && ((alarm->pending & evidence->rewound) != 0U)) {
+        alarm->state = HG_PLANT_NONE; /* raised with radii that were too small; judged anew below */
+        alarm->up = 0U;
+    }
+    count(alarm, config, raised);
+    if (alarm->state == HG_PLANT_NONE) {
+        if (alarm->up >= config->up) {
+            alarm->state = HG_PLANT_PROVISIONAL;
+            alarm->pending = feeds & evidence->doubt;
+        }
+    } else {
+        alarm->pending &= evidence->doubt;
+    }
+    if ((alarm->state == HG_PLANT_PROVISIONAL) && (alarm->pending == 0U)) {
+        alarm->state = HG_PLANT_CONFIRMED;
+    }
+    if ((alarm->state == HG_PLANT_CONFIRMED) && (alarm->down >= config->down) && (!config->latch)) {
+        alarm->state = HG_PLANT_NONE;
+    }
+}
+
+hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32_t *candidates)
+{
+    const hg_decision_config *config = self->config;
+    hg_plant plant = evidence->ready ? HG_PLANT_NONE : HG_PLANT_STARTING;
+    uint32_t common = UINT32_MAX;
+    for (uint8_t g = 0U; g < config->generators; g++) {
+        hg_alarm *alarm = &self->alarm[g];
+        alarm_step(alarm, config, config->feeds[g], ((evidence->alarm >> g) & 1U) != 0U, evidence);
+        if (alarm->state != HG_PLANT_NONE) {
+            common &= config->faults[g];
+            plant = (alarm->state > plant) ? alarm->state : plant;
+        }
+    }
+    *candidates = (plant >= HG_PLANT_PROVISIONAL) ? common : 0U;
+    return plant;
+}

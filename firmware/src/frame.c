@@ -1,0 +1,173 @@
+#include "hullguard/frame.h"
+
+#include "hullguard/e2e.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+
+#define FLOAT32_QUIET_NAN 0x7FC00000UL
+#define FLOAT32_BITS 32U
+
+/* Lengths that CAN FD's 4-bit length code can say. */
+static bool fd_length(uint8_t length)
+{
+    static const uint8_t above_eight[] = {12U, 16U, 20U, 24U, 32U, 48U, 64U};
+    bool found = length <= HG_CAN_CLASSIC_MAX;
+    for (uint8_t i = 0U; i < (uint8_t)sizeof(above_eight); i++) {
+        found = found || (length == above_eight[i]);
+    }
+    return found;
+}
+
+/* Position in the frame of bit i of a field, i = 0 the least significant; bit p is bit p % 8 of byte p / 8. */
+static uint16_t position(const hg_field *field, uint8_t i)
+{
+    uint16_t bit = field->start + i;
+    if ((field->flags & HG_FIELD_MOTOROLA) != 0U) {
+        /* A Motorola field runs down its byte and on to the top of the next: count in the order of transmission. */
+        const uint16_t sent = (uint16_t)(((field->start / 8U) * 8U) + (7U - (field->start % 8U)) + (field->length - 1U - i));
+        bit = (uint16_t)(((sent / 8U) * 8U) + (7U - (sent % 8U)));
+    }
+    return bit;
+}
+
+static uint32_t mask_of(const hg_field *field)
+{
+    return (field->length >= 32U) ? UINT32_MAX : (((uint32_t)1U << field->length) - 1U);
+}
+
+static bool field_valid(const hg_message *message, const hg_field *field)
+{
+    const bool is_signed = (field->flags & HG_FIELD_SIGNED) != 0U;
+    const bool is_float = (field->flags & HG_FIELD_FLOAT32) != 0U;
+    bool valid = (field->length >= 1U) && (field->length <= ((is_signed || is_float) ? 32U : 31U));
+    valid = valid && ((!is_float) || (field->length == FLOAT32_BITS));
+    for (uint8_t i = 0U; valid && (i < field->length); i++) {
+        const uint16_t bit = position(field, i);
+        valid = (bit >= (8U * HG_E2E_P22_HEADER)) && (bit < (8U * (uint16_t)message->length));
+    }
+    return valid;
+}
+
+/* Would a code of this scale come out of an integer field as another one, or as the pattern for no value? */
+static bool scale_fits(const hg_field *field, const hg_code_scale *scale)
+{
+    const bool is_signed = (field->flags & HG_FIELD_SIGNED) != 0U;
+    const int64_t ones = (int64_t)(mask_of(field) >> (is_signed ? 1U : 0U));
+    const int64_t least = is_signed ? -ones : 0;
+    const int64_t most = is_signed ? ones : (ones - 1);
+    return ((field->flags & HG_FIELD_FLOAT32) != 0U) || ((scale->minimum >= least) && (scale->maximum <= most));
+}
+
+bool hg_frame_valid(const hg_message *message)
+{
+    const bool fd = (message->flags & HG_CAN_FD) != 0U;
+    const bool extended = (message->flags & HG_CAN_EXTENDED) != 0U;
+    bool valid = (message->data_id != NULL) && (message->length >= HG_E2E_P22_HEADER) && (message->width <= HG_GROUP_SIGNALS_MAX) &&
+                 (message->length <= (fd ? HG_E2E_P22_LENGTH : HG_CAN_CLASSIC_MAX)) && fd_length(message->length);
+    valid = valid && (message->id <= (extended ? HG_CAN_ID_EXTENDED : HG_CAN_ID_STANDARD));
+    valid = valid && ((message->width == 0U) || ((message->field != NULL) && (message->scale != NULL)));
+    for (uint8_t g = 0U; valid && (g < message->width); g++) {
+        valid = field_valid(message, &message->field[g]) && scale_fits(&message->field[g], &message->scale[g]);
+    }
+    return valid;
+}
+
+/* The pattern that stands for no value. */
+static uint32_t invalid_pattern(const hg_field *field)
+{
+    uint32_t pattern = mask_of(field);
+    if ((field->flags & HG_FIELD_FLOAT32) != 0U) {
+        pattern = FLOAT32_QUIET_NAN;
+    } else if ((field->flags & HG_FIELD_SIGNED) != 0U) {
+        pattern = (uint32_t)1U << (field->length - 1U);
+    } else {
+        /* all ones */
+    }
+    return pattern;
+}
+
+static uint32_t pattern_of(const hg_field *field, const hg_code_scale *scale, int32_t code)
+{
+    uint32_t pattern = (uint32_t)code & mask_of(field);
+    if (!hg_code_valid(scale, code)) {
+        pattern = invalid_pattern(field);
+    } else if ((field->flags & HG_FIELD_FLOAT32) != 0U) {
+        const float value = (float)hg_code_value(scale, code);
+        (void)memcpy(&pattern, &value, sizeof(pattern));
+    } else {
+        /* an integer field is the code itself */
+    }
+    return pattern;
+}
+
+static int32_t code_of(const hg_field *field, const hg_code_scale *scale, uint32_t pattern)
+{
+    int32_t code;
+    if ((field->flags & HG_FIELD_FLOAT32) != 0U) {
+        float value;
+        (void)memcpy(&value, &pattern, sizeof(value));
+        code = hg_code_encode(scale, (hg_real)value);
+    } else {
+        const bool negative = ((field->flags & HG_FIELD_SIGNED) != 0U) && ((pattern >> (field->length - 1U)) != 0U);
+        const uint32_t extended = negative ? (pattern | ~mask_of(field)) : pattern;
+        (void)memcpy(&code, &extended, sizeof(code)); /* two's complement, without an implementation-defined conversion */
+    }
+    return code;
+}
+
+void hg_frame_pack(const hg_message *message, const int32_t *code, hg_can_frame *frame)
+{
+    (void)memset(frame, 0, sizeof(*frame));
+    frame->id = message->id;
+    frame->flags = message->flags;
+    frame->length = message->length;
+    for (uint8_t g = 0U; g < message->width; g++) {
+        const hg_field *field = &message->field[g];
+        const uint32_t pattern = pattern_of(field, &message->scale[g], code[g]);
+        for (uint8_t i = 0U; i < field->length; i++) {
+            const uint16_t bit = position(field, i);
+            frame->data[bit / 8U] |= (uint8_t)(((pattern >> i) & 1U) << (bit % 8U));
+        }
+    }
+}
+
+bool hg_frame_matches(const hg_message *message, const hg_can_frame *frame)
+{
+    const uint8_t kind = HG_CAN_EXTENDED | HG_CAN_REMOTE | HG_CAN_FD | HG_CAN_ERROR;
+    return (frame->id == message->id) && ((frame->flags & kind) == (message->flags & kind)) && (frame->length == message->length);
+}
+
+static uint32_t read_field(const hg_field *field, const uint8_t *data)
+{
+    uint32_t pattern = 0U;
+    for (uint8_t i = 0U; i < field->length; i++) {
+        const uint16_t bit = position(field, i);
+        pattern |= (uint32_t)(((uint32_t)data[bit / 8U] >> (bit % 8U)) & 1U) << i;
+    }
+    return pattern;
+}
+
+hg_status hg_frame_unpack(const hg_message *message, const hg_can_frame *frame, int32_t *code)
+{
+    int32_t read[HG_GROUP_SIGNALS_MAX];
+    if (!hg_frame_matches(message, frame)) {
+        return HG_E_FORMAT;
+    }
+    for (uint8_t g = 0U; g < message->width; g++) {
+        const hg_field *field = &message->field[g];
+        const uint32_t pattern = read_field(field, frame->data);
+        read[g] = HG_CODE_INVALID;
+        if (pattern != invalid_pattern(field)) {
+            read[g] = code_of(field, &message->scale[g], pattern);
+            if (!hg_code_valid(&message->scale[g], read[g])) {
+                return HG_E_NUMERIC;
+            }
+        }
+    }
+    for (uint8_t g = 0U; g < message->width; g++) {
+        code[g] = read[g];
+    }
+    return HG_OK;
+}

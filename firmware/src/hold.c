@@ -1,0 +1,192 @@
+#include "hullguard/hold.h"
+
+#include <stddef.h>
+
+#define GOOD_IN_ROW 2U /* frames after which the sender's level is known: it follows from two successive ones */
+
+static uint8_t horizon(const hg_hold_config *config)
+{
+    return (uint8_t)(config->trigger->interval_max + config->margin);
+}
+
+static bool tables_valid(const hg_hold_config *config)
+{
+    bool valid = (config->trigger != NULL) && hg_trigger_valid(config->trigger);
+    valid = valid && (((uint16_t)config->trigger->interval_max + config->margin) < UINT8_MAX);
+    if (valid && (config->trigger->width > 0U)) {
+        valid = (config->scale != NULL) && (config->half != NULL) && (config->slew != NULL) && (config->span != NULL) &&
+                (config->middle != NULL);
+    }
+    return valid;
+}
+
+hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes)
+{
+    if ((self == NULL) || (config == NULL) || (codes == NULL)) {
+        return HG_E_ARGUMENT;
+    }
+    if (!tables_valid(config)) {
+        return HG_E_CONFIG;
+    }
+    const uint8_t width = config->trigger->width;
+    self->config = config;
+    self->sent = codes;
+    self->previous = &codes[width];
+    self->age = UINT8_MAX;
+    self->good = 0U;
+    self->level = 0U;
+    self->seen = false;
+    self->recovering = false;
+    self->fresh = false;
+    self->lost = false;
+    self->doubt = false;
+    self->gap = false;
+    self->gap_age = 0U;
+    for (uint8_t g = 0U; g < width; g++) {
+        self->sent[g] = HG_CODE_INVALID;
+        self->previous[g] = HG_CODE_INVALID;
+    }
+    return HG_OK;
+}
+
+hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
+{
+    if (self->fresh) {
+        return HG_E_REPEATED;
+    }
+    const hg_trigger_config *trigger = self->config->trigger;
+    /* A group that was stale may have lost as many frames as the counter counts: its continuing proves nothing. */
+    const bool whole = continues && (!self->lost) && (self->age < horizon(self->config)) && (self->good > 0U);
+    self->gap = self->doubt && (!whole);
+    self->gap_age = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
+    for (uint8_t g = 0U; g < trigger->width; g++) {
+        self->previous[g] = self->sent[g];
+        self->sent[g] = code[g];
+    }
+    self->recovering = self->seen && (!whole);
+    self->seen = true;
+    self->good = whole ? GOOD_IN_ROW : 1U;
+    self->level = whole ? hg_trigger_level(trigger, self->sent, self->previous) : 0U;
+    self->lost = false;
+    self->fresh = true;
+    return HG_OK;
+}
+
+void hg_hold_lose(hg_hold *self)
+{
+    self->lost = true;
+}
+
+/* Largest silent time and threshold that the sender may be using: its level's, or over all levels while that is not known. */
+static uint8_t silence(const hg_hold *self)
+{
+    const hg_trigger_config *trigger = self->config->trigger;
+    uint8_t longest = 0U;
+    for (uint8_t l = 0U; l < trigger->levels; l++) {
+        const bool possible = (self->good < GOOD_IN_ROW) || (l == self->level);
+        longest = (possible && (trigger->silence[l] > longest)) ? trigger->silence[l] : longest;
+    }
+    return longest;
+}
+
+static int32_t threshold(const hg_hold *self, uint8_t g)
+{
+    const hg_trigger_config *trigger = self->config->trigger;
+    int32_t widest = 0;
+    for (uint8_t l = 0U; l < trigger->levels; l++) {
+        const bool possible = (self->good < GOOD_IN_ROW) || (l == self->level);
+        const int32_t one = possible ? hg_trigger_threshold(trigger, l, g, self->sent[g]) : 0;
+        widest = (one > widest) ? one : widest;
+    }
+    return widest;
+}
+
+static hg_real slew(const hg_hold_config *config, uint8_t age, uint8_t g)
+{
+    return config->slew[((uint16_t)(age - 1U) * config->trigger->width) + g];
+}
+
+/* Radius of channel g between frames; sets *conditional where it relies on the sender's silence. */
+static hg_real between(const hg_hold *self, uint8_t g, bool *conditional)
+{
+    const hg_hold_config *config = self->config;
+    hg_real radius = slew(config, self->age, g);
+    if ((!self->lost) && (self->age > silence(self))) {
+        const hg_real promised = hg_real_mul(config->scale[g].resolution, (hg_real)threshold(self, g)) + config->half[g];
+        if (promised < radius) {
+            radius = promised;
+            *conditional = true;
+        }
+    }
+    return radius;
+}
+
+void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewind)
+{
+    const hg_hold_config *config = self->config;
+    const bool was_in_doubt = self->doubt;
+    bool conditional = false;
+    if (self->fresh) {
+        self->age = 0U;
+    } else if (self->age < UINT8_MAX) {
+        self->age++;
+    } else {
+        /* nothing known for so long that counting on would not say more */
+    }
+    const bool stale = self->age > horizon(config);
+    if ((!self->fresh) && (self->age >= config->trigger->interval_max)) {
+        self->lost = true; /* the sender speaks at least this often */
+    }
+    if (self->lost) {
+        self->good = 0U;
+    }
+    for (uint8_t g = 0U; g < config->trigger->width; g++) {
+        const bool known = self->sent[g] != HG_CODE_INVALID;
+        value[g] = known ? hg_code_value(&config->scale[g], self->sent[g]) : config->middle[g];
+        if (stale || (!known)) {
+            radius[g] = config->span[g];
+        } else if (self->fresh) {
+            radius[g] = config->half[g];
+        } else {
+            radius[g] = between(self, g, &conditional);
+        }
+    }
+    const bool newly_lost = was_in_doubt && self->lost && (!self->fresh);
+    if (newly_lost) {
+        self->gap_age = self->age;
+    }
+    *rewind = (newly_lost || (self->fresh && self->gap)) ? (uint8_t)(self->gap_age - 1U) : 0U;
+    self->doubt = (!self->fresh) && (!self->lost) && (was_in_doubt || conditional);
+    self->gap = self->fresh && self->gap;
+    self->fresh = false;
+}
+
+void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius)
+{
+    const hg_hold_config *config = self->config;
+    /* After a frame that revealed the loss, the value held in between is the one before it. */
+    const int32_t *held = self->gap ? self->previous : self->sent;
+    for (uint8_t g = 0U; g < config->trigger->width; g++) {
+        radius[g] = (held[g] == HG_CODE_INVALID) ? config->span[g] : slew(config, (uint8_t)(self->gap_age - lag), g);
+    }
+}
+
+bool hg_hold_doubt(const hg_hold *self)
+{
+    return self->doubt;
+}
+
+hg_bus_health hg_hold_health(const hg_hold *self)
+{
+    hg_bus_health health = HG_BUS_GOOD;
+    if (!self->seen) {
+        health = HG_BUS_ABSENT;
+    } else if (self->age > horizon(self->config)) {
+        health = HG_BUS_STALE;
+    } else if (self->lost || self->recovering) {
+        health = HG_BUS_LOSSY;
+    } else {
+        /* good */
+    }
+    return health;
+}

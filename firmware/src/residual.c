@@ -1,0 +1,59 @@
+#include "hullguard/residual.h"
+
+#include <stddef.h>
+
+bool hg_residual_valid(const hg_residual_config *config)
+{
+    return (config->order >= 1U) && (config->residuals >= 1U) && (config->width >= 1U) && (config->signal != NULL) &&
+           hg_linalg_fits(&config->state, &config->input, config->order, config->order, config->width) &&
+           hg_linalg_fits(&config->output, &config->direct, config->residuals, config->order, config->width);
+}
+
+hg_status hg_residual_start(hg_residual *self, const hg_residual_config *config, hg_real *memory)
+{
+    if ((self == NULL) || (config == NULL) || (memory == NULL)) {
+        return HG_E_ARGUMENT;
+    }
+    if (!hg_residual_valid(config)) {
+        return HG_E_CONFIG;
+    }
+    self->config = config;
+    self->z = memory;
+    self->next = &memory[config->order];
+    self->input = &memory[2U * (uint16_t)config->order];
+    hg_residual_reset(self);
+    return HG_OK;
+}
+
+void hg_residual_reset(hg_residual *self)
+{
+    for (uint8_t i = 0U; i < self->config->order; i++) {
+        self->z[i] = HG_REAL_ZERO;
+    }
+}
+
+hg_status hg_residual_step(hg_residual *self, const hg_real *value, hg_real *r)
+{
+    const hg_residual_config *config = self->config;
+    for (uint8_t g = 0U; g < config->width; g++) {
+        self->input[g] = value[config->signal[g]];
+    }
+    if (!hg_linalg_finite(self->input, config->width)) {
+        return HG_E_NUMERIC;
+    }
+    hg_linalg_apply(&config->state, self->z, &config->input, self->input, self->next);
+    if (!hg_linalg_finite(self->next, config->order)) {
+        return HG_E_NUMERIC; /* once in z, an infinity would make all that follows NaN */
+    }
+    hg_linalg_apply(&config->output, self->z, &config->direct, self->input, r);
+    hg_real *swap = self->z;
+    self->z = self->next;
+    self->next = swap;
+    return HG_OK;
+}
+
+hg_status hg_residual_pair_step(hg_residual_pair *self, const hg_real *value, hg_real *r0, hg_real *r)
+{
+    const hg_status status = hg_residual_step(&self->observer, value, r0);
+    return (status == HG_OK) ? hg_residual_step(&self->filter, r0, r) : status;
+}

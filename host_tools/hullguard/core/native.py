@@ -1,0 +1,479 @@
+"""Tables of a design as the C structures they describe, and the C objects that run on them.
+
+Nothing is computed here: every number goes where the generated C would put it, so that both ways give the same verdicts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hullguard.core.library import Library
+from hullguard.design.design import Design
+from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, Tables
+from hullguard.errors import InputError
+from hullguard.model.faults import FaultSpec
+from hullguard.model.schema import Model, Reference
+from hullguard.model.table import Array
+
+PLANT_STATES = ("starting", "none", "provisional", "confirmed")
+BUS_STATES = ("absent", "good", "lossy", "stale")
+FAULT_KINDS = {"bias": 1, "drift": 2, "gain": 3, "freeze": 4, "noise": 5}
+REFERENCE_KINDS = {"rest": 0, "steps": 1, "ramps": 2, "sines": 3, "mixed": 4}
+FOREVER = 2**63 - 1
+REST, MOVING = 1, 0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A CAN frame on the host."""
+
+    id: int
+    flags: int
+    data: bytes
+
+
+class Native:
+    """The constant structures of one model, and the memory they lie in."""
+
+    def __init__(self, library: Library, tables: Tables) -> None:
+        self.library, self.tables = library, tables
+        self._keep: list[Any] = []
+        ffi = library.ffi
+        count = len(tables.groups)
+        self.messages = ffi.new("hg_message[]", count)
+        self.scales: list[Any] = []
+        triggers = self._new("hg_trigger_config[]", count)
+        holds = self._new("hg_hold_config[]", count)
+        self.senders = self._new("hg_sender_config[]", count)
+        for i, g in enumerate(tables.groups):
+            self._trigger(triggers[i], g)
+            self._message(self.messages[i], g.message, g)
+            self._hold(holds[i], g, ffi.addressof(triggers, i))
+            self.senders[i].message = ffi.addressof(self.messages, i)
+            self.senders[i].trigger = ffi.addressof(triggers, i)
+        self.node = self._new("hg_node_config *")
+        detector = self._detector(holds)
+        extra = self._new("hg_message[]", 2)
+        self._message(extra[0], tables.verdict, None)
+        self._message(extra[1], tables.status, None)
+        self.verdict = ffi.addressof(extra, 0)
+        self.node.detector, self.node.message, self.node.closing = detector, self.messages, tables.closing
+        self.node.verdict, self.node.status = self.verdict, ffi.addressof(extra, 1)
+        self.node.heartbeat, self.node.model_hash = tables.heartbeat, tables.hash
+
+    def _new(self, kind: str, value: Any = None) -> Any:
+        made = self.library.ffi.new(kind, value)
+        self._keep.append(made)
+        return made
+
+    def _reals(self, values: Any) -> Any:
+        return self._new("hg_real[]", [float(v) for v in np.ravel(np.array(values, dtype=float))] or [0.0])
+
+    def _ints(self, kind: str, values: Any) -> Any:
+        return self._new(f"{kind}[]", [int(v) for row in values for v in (row if isinstance(row, tuple) else (row,))] or [0])
+
+    def _trigger(self, t: Any, g: GroupTable) -> None:
+        t.width, t.levels, t.interval_max = len(g.signals), g.levels, g.interval_max
+        t.silence, t.delta = self._ints("uint8_t", g.silence), self._ints("uint16_t", g.delta)
+        t.sigma, t.activity = self._ints("int32_t", g.sigma), self._ints("int32_t", g.activity)
+        t.zero = self._ints("int32_t", [s.zero for s in g.signals])
+
+    def _message(self, m: Any, table: MessageTable, g: GroupTable | None) -> None:
+        signals = g.signals if g else ()
+        m.id, m.flags, m.length, m.width = table.id, table.flags, table.length, len(signals)
+        m.data_id = self._ints("uint8_t", table.data_id)
+        if g is None:
+            return
+        fields, scales = self._new("hg_field[]", len(signals) or 1), self._new("hg_code_scale[]", len(signals) or 1)
+        for i, s in enumerate(signals):
+            fields[i].start, fields[i].length, fields[i].flags = s.start, s.length, s.flags
+            scales[i].resolution, scales[i].offset, scales[i].per_unit = s.resolution, s.offset, s.per_unit
+            scales[i].minimum, scales[i].maximum = s.minimum, s.maximum
+        m.field, m.scale = fields, scales
+        self.scales.append(scales)
+
+    def _hold(self, h: Any, g: GroupTable, trigger: Any) -> None:
+        h.trigger, h.margin, h.scale = trigger, g.margin, self.scales[-1]
+        h.half, h.span = self._reals([s.half for s in g.signals]), self._reals([s.span for s in g.signals])
+        h.middle, h.slew = self._reals([s.middle for s in g.signals]), self._reals(g.slew)
+
+    def _matrix(self, m: Any, table: tuple[tuple[float, ...], ...]) -> None:
+        m.rows, m.cols, m.exponent, m.data = len(table), len(table[0]), 0, self._reals(table)
+
+    def _detector(self, holds: Any) -> Any:
+        t = self.tables
+        count = len(t.generators)
+        residuals, hulls = self._new("hg_residual_config[]", count), self._new("hg_hull_config[]", count)
+        for i, g in enumerate(t.generators):
+            self._generator(residuals[i], hulls[i], g)
+        d = self._new("hg_detector_config *")
+        d.signals, d.groups, d.hold = t.signals, len(t.groups), holds
+        d.generators, d.residual, d.hull = count, residuals, hulls
+        d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = count, t.up, t.down, t.latch
+        d.decision.feeds = self._ints("uint8_t", [g.feeds for g in t.generators])
+        d.decision.faults = self._ints("uint32_t", [g.faults for g in t.generators])
+        d.history, d.residuals, d.codes = t.history, t.residuals, 2 * t.signals
+        d.reals = self.library.lib.hg_detector_reals(d)
+        return d
+
+    def _generator(self, r: Any, h: Any, g: GeneratorTable) -> None:
+        signal = self._ints("uint8_t", g.signal)
+        r.order, r.residuals, r.width, r.signal = len(g.state), len(g.output), len(g.signal), signal
+        for place, table in ((r.state, g.state), (r.input, g.input), (r.output, g.output), (r.direct, g.direct)):
+            self._matrix(place, table)
+        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.signal), signal, g.taps
+        h.weight, h.settle, h.rest, h.moving = self._reals(g.weight), g.settle, self._reals(g.rest), self._reals(g.moving)
+        h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, g.decay
+        h.tail_input, h.tail_output = self._reals(g.tail_input), self._reals(g.tail_output)
+
+
+def frame_out(library: Library, frame: Any) -> Frame:
+    """A C frame as a Python one."""
+    return Frame(int(frame.id), int(frame.flags), bytes(library.ffi.buffer(frame.data, frame.length)))
+
+
+def frame_in(library: Library, frame: Frame) -> Any:
+    """A Python frame as a C one."""
+    made = library.ffi.new("hg_can_frame *")
+    made.id, made.flags, made.length = frame.id, frame.flags, len(frame.data)
+    library.ffi.buffer(made.data)[: len(frame.data)] = frame.data
+    return made
+
+
+def frame_bits(library: Library, frame: Frame) -> int:
+    """Bits on the wire, exact."""
+    return int(library.lib.hgh_frame_bits(frame_in(library, frame)))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a verdict frame says, or a node's record of it."""
+
+    k: int
+    plant: str
+    candidates: int
+    bus: tuple[str, ...]
+    refused: bool
+    reply: bool = False
+
+
+def bus_of(bits: int, groups: int) -> tuple[str, ...]:
+    """Health of each group's link."""
+    return tuple(BUS_STATES[bits >> 2 * i & 3] for i in range(groups))
+
+
+class Node:
+    """A detector node in this process."""
+
+    def __init__(self, native: Native, start: int) -> None:
+        self.native = native
+        lib, ffi, t = native.library.lib, native.library.ffi, native.tables
+        self._lib, self._ffi = lib, ffi
+        groups, count = len(t.groups), len(t.generators)
+        d = native.node.detector
+        memory = ffi.new("hg_node_memory *")
+        self._keep = [memory] + [ffi.new(f"{kind}[]", n) for kind, n in (("hg_hold", groups), ("hg_residual", count), ("hg_hull", count), ("hg_alarm", count))]
+        memory.detector.hold, memory.detector.residual, memory.detector.hull, memory.detector.alarm = self._keep[1:5]
+        code, real = ffi.new("int32_t[]", max(2 * t.signals, 1)), ffi.new("hg_real[]", d.reals)
+        link, closing = ffi.new("hg_link[]", groups), ffi.new("int32_t[]", len(t.groups[t.closing].signals) + 1)
+        self._keep += [code, real, link, closing]
+        memory.detector.code, memory.detector.codes = code, d.codes
+        memory.detector.real, memory.detector.reals = real, d.reals
+        memory.link, memory.closing = link, closing
+        self.node = ffi.new("hg_node *")
+        status = lib.hg_node_start(self.node, native.node, memory, start)
+        if status != lib.HG_OK:
+            raise InputError(f"model {t.name}: the library refused its tables (status {status})")
+        self._verdict, self._frames = ffi.new("hg_verdict *"), ffi.new("hg_can_frame[2]")
+
+    def receive(self, frame: Frame) -> int:
+        """Take a frame from the bus; the library's status."""
+        return int(self._lib.hg_node_receive(self.node, frame_in(self.native.library, frame)))
+
+    def overdue(self) -> None:
+        """The closing frame has not come in time."""
+        self._lib.hg_node_overdue(self.node)
+
+    def step(self) -> Verdict | None:
+        """Make one step that is due; None when there is none."""
+        if self._lib.hg_node_step(self.node, self._verdict) != self._lib.HG_OK:
+            return None
+        v = self._verdict
+        return Verdict(int(v.k), PLANT_STATES[v.plant], int(v.candidates), bus_of(v.bus, len(self.native.tables.groups)), bool(v.refused))
+
+    def report(self, lockstep: bool) -> list[Frame]:
+        """Frames to send after the last step."""
+        count = self._lib.hg_node_report(self.node, self._verdict, lockstep and self.node.due == 0, self._frames)
+        return [frame_out(self.native.library, self._frames[i]) for i in range(count)]
+
+    def _numbers(self, pointer: Any, count: int) -> list[float]:
+        return list(self._ffi.unpack(pointer, count)) if count else []
+
+    @property
+    def value(self) -> list[float]:
+        """Held values of the last step."""
+        return self._numbers(self.node.detector.value, self.native.tables.signals)
+
+    @property
+    def radius(self) -> list[float]:
+        """Radii of the last step."""
+        return self._numbers(self.node.detector.radius, self.native.tables.signals)
+
+    @property
+    def r(self) -> list[float]:
+        """Residuals of the last step, generators one after another."""
+        return self._numbers(self.node.detector.r, self.native.tables.residuals)
+
+    @property
+    def J(self) -> list[float]:
+        """Thresholds of the last step."""
+        return self._numbers(self.node.detector.J, self.native.tables.residuals)
+
+    def health(self) -> dict[str, int]:
+        """Counters of all links together, by name, and of the node."""
+        total = dict.fromkeys(("good", "lost", "crc", "format", "repeated", "early", "late", "numeric", "invalid"), 0)
+        for i in range(len(self.native.tables.groups)):
+            link = self._lib.hg_node_health(self.node, i)
+            for name in total:
+                total[name] += int(getattr(link, name))
+        return total | {"unknown": int(self.node.unknown), "overdue": int(self.node.overdue)}
+
+
+def read_verdict(native: Native, frame: Frame) -> Verdict | None:
+    """A verdict frame's content; None when it is none, or damaged."""
+    lib, ffi = native.library.lib, native.library.ffi
+    verdict, reply = ffi.new("hg_verdict *"), ffi.new("bool *")
+    if frame.id != native.tables.verdict.id or lib.hg_verdict_read(native.verdict, frame_in(native.library, frame), verdict, reply) != lib.HG_OK:
+        return None
+    return Verdict(int(verdict.k), PLANT_STATES[verdict.plant], int(verdict.candidates), bus_of(verdict.bus, len(native.tables.groups)), bool(verdict.refused), bool(reply[0]))
+
+
+class Sender:
+    """The senders of all groups of a model."""
+
+    def __init__(self, native: Native) -> None:
+        self.native = native
+        ffi, lib = native.library.ffi, native.library.lib
+        self._lib = lib
+        self._senders, self._keep, self._value = [], [], []
+        for i, g in enumerate(native.tables.groups):
+            sender, code = ffi.new("hg_sender *"), ffi.new("int32_t[]", 2 * len(g.signals) or 1)
+            status = lib.hg_sender_start(sender, ffi.addressof(native.senders, i), code)
+            if status != lib.HG_OK:
+                raise InputError(f"group '{g.name}': the library refused its tables (status {status})")
+            self._senders.append(sender)
+            self._keep.append(code)
+            self._value.append(ffi.new("hg_real[]", len(g.signals) or 1))
+        self._frame = ffi.new("hg_can_frame *")
+
+    def step(self, group: int, k: int, reading: Sequence[float]) -> Frame | None:
+        """One sample of one group; the frame to send, if its trigger says so. `reading` is the whole signal vector."""
+        table = self.native.tables.groups[group]
+        value = self._value[group]
+        for i in range(len(table.signals)):
+            value[i] = reading[table.first + i]
+        if self._lib.hg_sender_step(self._senders[group], k & 0xFFFFFFFF, value, self._frame) != self._lib.HG_OK:
+            return None
+        return frame_out(self.native.library, self._frame)
+
+
+def fault_array(library: Library, model: Model, faults: Sequence[FaultSpec]) -> Any:
+    """Faults as hgh_fault[]; a fault's name carries its type, a bare signal's is an actuator's where the plant applies what was sent."""
+    made = library.ffi.new("hgh_fault[]", max(len(faults), 1))
+    for i, f in enumerate(faults):
+        signal = model.signal(f.name)
+        named = [x for x in model.faults if x.name == f.name]
+        applied = any(g.applied_as_sent and signal in g.signals for g in model.groups)
+        actuator = named[0].type == "actuator" if named else applied
+        made[i].signal, made[i].actuator, made[i].kind = signal, int(actuator), FAULT_KINDS[f.kind]
+        made[i].size, made[i].start, made[i].end = f.size, f.start, FOREVER if f.end is None else f.end
+    return made
+
+
+def reference_of(library: Library, reference: Reference) -> Any:
+    """A scenario's reference as hgh_reference."""
+    made = library.ffi.new("hgh_reference *")
+    made.kind, made.period, made.amplitude = REFERENCE_KINDS[reference.kind], max(reference.period, 1), reference.amplitude
+    return made[0]
+
+
+class PlantConfig:
+    """hgh_plant_config of a design."""
+
+    def __init__(self, native: Native, design: Design) -> None:
+        ffi, model = native.library.ffi, design.model
+        plant = model.plant
+        if plant.n > 64 or plant.p > 64 or len(model.signals) > 96 or plant.Ed.shape[1] > 192:
+            raise InputError(f"model {model.name}: the emulator has room for 64 states, 96 signals and 192 disturbances")
+        self._keep: list[Any] = []
+
+        def doubles(a: Array) -> Any:
+            made = ffi.new("double[]", np.ravel(a).tolist() or [0.0])
+            self._keep.append(made)
+            return made
+
+        def ints(values: Sequence[int]) -> Any:
+            made = ffi.new("int32_t[]", list(values) or [0])
+            self._keep.append(made)
+            return made
+
+        c = ffi.new("hgh_plant_config *")
+        c.n, c.m, c.p, c.nd, c.signals = plant.n, plant.m, plant.p, plant.Ed.shape[1], len(model.signals)
+        c.A, c.B, c.C, c.D, c.Ed, c.Fd = (doubles(x) for x in (plant.A, plant.B, plant.C, plant.D, plant.Ed, plant.Fd))
+        if plant.feedback is not None:
+            c.gain, c.reference_bound = doubles(plant.feedback.gain), doubles(plant.feedback.reference_bound)
+        else:
+            bound = np.array([min(-model.signals[i].low, model.signals[i].high) for i in model.inputs])
+            c.reference_bound = doubles(np.maximum(bound, 0.0))
+        c.equilibrium, c.initial_range = doubles(plant.equilibrium), doubles(plant.initial_range)
+        c.output, c.input = ints(model.outputs), ints(model.inputs)
+        group_of = {i: (g, gi) for gi, g in enumerate(model.groups) for i in g.signals}
+        c.as_sent = ints([int(group_of[i][0].applied_as_sent) for i in model.inputs])
+        scale = ffi.new("hg_code_scale[]", plant.p or 1)
+        for row, i in enumerate(model.inputs):
+            g, gi = group_of[i]
+            ffi.memmove(ffi.addressof(scale, row), ffi.addressof(native.scales[gi], g.signals.index(i)), ffi.sizeof("hg_code_scale"))
+        self._keep.append(scale)
+        c.scale, c.sample_time_s = scale, model.sample_time_s
+        self.config = c
+
+
+class Plant:
+    """The emulated plant."""
+
+    def __init__(self, native: Native, design: Design, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int = 0) -> None:
+        self._native, self._config = native, PlantConfig(native, design)
+        ffi = native.library.ffi
+        self._plant, self._value = ffi.new("hgh_plant *"), ffi.new("double[]", len(design.model.signals))
+        array = fault_array(native.library, design.model, faults)
+        native.library.lib.hgh_plant_start(self._plant, self._config.config, reference_of(native.library, reference), array, len(faults), seed, run)
+
+    def read(self) -> list[float]:
+        """Readings of the open sample: the whole signal vector."""
+        self._native.library.lib.hgh_plant_read(self._plant, self._native.library.ffi.NULL, self._value)
+        return list(self._value)
+
+    def move(self) -> None:
+        """On to the next sample."""
+        self._native.library.lib.hgh_plant_move(self._plant)
+
+
+class Recording:
+    """Recorded readings with seeded sensor noise and faults: the emulator's stand-in in a replay."""
+
+    def __init__(self, native: Native, model: Model, series: Array, noise: bool, faults: Sequence[FaultSpec], seed: int, run: int = 0) -> None:
+        self._series, self._lib, self._k = series, native.library.lib, 0
+        self._noise = [s.noise for s in model.signals] if noise else None
+        ffi = native.library.ffi
+        self._faults, self._random = ffi.new("hgh_faults *"), ffi.new("hgh_random *")
+        array = fault_array(native.library, model, faults)
+        self._lib.hgh_faults_start(self._faults, array, len(faults), model.sample_time_s, seed, run)
+        self._lib.hgh_random_start(self._random, seed, run, 4)
+
+    def read(self) -> list[float]:
+        """Readings of the open sample."""
+        values = self._series[self._k].tolist()
+        if self._noise is not None:
+            values = [v + n * self._lib.hgh_random_signed(self._random) for v, n in zip(values, self._noise, strict=True)]
+        return [self._lib.hgh_faults_apply(self._faults, 0, i, self._k, v) for i, v in enumerate(values)]
+
+    def move(self) -> None:
+        """On to the next sample."""
+        self._k += 1
+
+
+RESULT = (
+    "measurement closing verdicts lost bits measurement_bits provisional_at confirmed_at false_provisional false_confirmed interval_min interval_max "
+    "margin margin_after candidates plant"
+).split()
+
+
+class Batch:
+    """Runs of one configuration in C: plant or recording, senders, losses, detector node, all in one process."""
+
+    def __init__(
+        self,
+        native: Native,
+        design: Design,
+        samples: int,
+        reference: Reference,
+        faults: Sequence[FaultSpec] = (),
+        seed: int = 1,
+        loss: float = 0.0,
+        start: int = REST,
+        series: Array | None = None,
+        noise: bool = False,
+        disturbance: Array | None = None,
+        initial: Array | None = None,
+    ) -> None:
+        ffi, model = native.library.ffi, design.model
+        self._native, self._model = native, model
+        self._keep: list[Any] = [PlantConfig(native, design), fault_array(native.library, model, faults)]
+
+        def doubles(a: Array) -> Any:
+            flat = np.ascontiguousarray(a, dtype=np.float64)
+            self._keep.append(flat)
+            return ffi.cast("double *", ffi.from_buffer(flat))
+
+        c = ffi.new("hgh_run_config *")
+        c.node, c.sender = native.node, native.senders
+        if series is None:
+            c.plant = self._keep[0].config
+        else:
+            if samples > len(series):
+                raise InputError(f"{samples} samples asked for, the recording has {len(series)}")
+            c.series = doubles(series)
+            if noise:
+                c.noise = doubles(np.array([s.noise for s in model.signals]))
+        if disturbance is not None:
+            c.disturbance = doubles(disturbance)
+        if initial is not None:
+            c.initial = doubles(initial)
+        c.reference, c.fault, c.faults = reference_of(native.library, reference), self._keep[1], len(faults)
+        c.signals, c.samples, c.sample_time_s = len(model.signals), samples, model.sample_time_s
+        c.loss, c.seed, c.start = loss, seed, start
+        self.config = c
+
+    def runs(self, first: int, count: int) -> list[dict[str, Any]]:
+        """Results of runs first .. first + count - 1, a row each."""
+        lib, ffi = self._native.library.lib, self._native.library.ffi
+        results = ffi.new("hgh_result[]", count)
+        if lib.hgh_batch(self.config, first, count, results) != count:
+            raise InputError(f"model {self._model.name}: the emulator refused the configuration")
+        return [{name: getattr(results[i], name) for name in RESULT} | {"run": first + i} for i in range(count)]
+
+    def trace(self, run: int = 0) -> dict[str, Array]:
+        """One run sample by sample: reading, value, radius (samples x signals), r, J (samples x residuals), events, plant, bus, bits."""
+        lib, ffi, t = self._native.library.lib, self._native.library.ffi, self._native.tables
+        made = lib.hgh_run_new(self.config, run)
+        if made == ffi.NULL:
+            raise InputError(f"model {self._model.name}: the emulator refused the configuration")
+        rows: dict[str, list[Any]] = {name: [] for name in ("reading", "value", "radius", "r", "J", "events", "plant", "bus", "bits")}
+        try:
+            more = True
+            while more:
+                more = lib.hgh_run_steps(made, 1)
+                view = lib.hgh_run_view(made)
+                for name in ("reading", "value", "radius"):
+                    rows[name].append(ffi.unpack(getattr(view, name), t.signals))
+                for name in ("r", "J"):
+                    rows[name].append(ffi.unpack(getattr(view, name), t.residuals))
+                for name in ("events", "plant", "bus", "bits"):
+                    rows[name].append(getattr(view, name))
+        finally:
+            lib.hgh_run_free(made)
+        return {name: np.array(values) for name, values in rows.items()}
+
+    def sweep(self, faults: Sequence[FaultSpec], start: int, step: int, starts: int, horizon: int) -> Array:
+        """Delay to the first alarm of each fault begun at each start: starts x faults, -1 where none comes within the horizon."""
+        lib, ffi = self._native.library.lib, self._native.library.ffi
+        array = fault_array(self._native.library, self._model, faults)
+        delay = np.empty((starts, len(faults)), dtype=np.int32)
+        made = lib.hgh_sweep(self.config, array, len(faults), start, step, starts, horizon, ffi.cast("int32_t *", ffi.from_buffer(delay)))
+        if made != starts:
+            raise InputError(f"model {self._model.name}: the emulator refused the configuration")
+        return delay.astype(np.float64)

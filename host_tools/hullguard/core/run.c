@@ -1,0 +1,331 @@
+#include "host.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct hgh_run {
+    hgh_run_config config;
+    size_t         size; /* of this block */
+    hgh_plant      plant;
+    hgh_faults     faults; /* of a replay */
+    hgh_random     noise, loss;
+    hgh_result     result;
+    int64_t        k;
+    int64_t        fault_start;
+    int64_t        last_event[HG_GROUPS_MAX];
+    uint32_t       events;
+    int64_t        bits; /* of the last sample */
+    hg_verdict     verdict;
+    hg_node        node;
+    hg_sender      sender[HG_GROUPS_MAX];
+    double         reading[HGH_SIGNALS_MAX], value[HGH_SIGNALS_MAX], radius[HGH_SIGNALS_MAX];
+    double        *r, *J;
+};
+
+/* Hands out pieces of the block behind the structure; counts only while base is null. */
+typedef struct {
+    char  *base;
+    size_t used;
+} arena;
+
+static void *take(arena *a, size_t count, size_t size)
+{
+    a->used = (a->used + 15U) & ~(size_t)15U;
+    char *p = (a->base != NULL) ? a->base + a->used : NULL;
+    a->used += count * size;
+    return p;
+}
+
+static hg_node_memory node_memory(arena *a, const hg_node_config *node)
+{
+    const hg_detector_config *d = node->detector;
+    hg_node_memory m;
+    m.detector.hold = take(a, d->groups, sizeof(hg_hold));
+    m.detector.residual = take(a, d->generators, sizeof(hg_residual));
+    m.detector.hull = take(a, d->generators, sizeof(hg_hull));
+    m.detector.alarm = take(a, d->generators, sizeof(hg_alarm));
+    m.detector.codes = (uint16_t)(2U * d->signals);
+    m.detector.code = take(a, m.detector.codes, sizeof(int32_t));
+    m.detector.reals = hg_detector_reals(d);
+    m.detector.real = take(a, m.detector.reals, sizeof(hg_real));
+    m.link = take(a, d->groups, sizeof(hg_link));
+    m.closing = take(a, (size_t)node->message[node->closing].width + 1U, sizeof(int32_t));
+    return m;
+}
+
+static int64_t first_fault(const hgh_fault *fault, int32_t count)
+{
+    int64_t first = INT64_MAX;
+    for (int32_t i = 0; i < count; i++) {
+        first = (fault[i].start < first) ? fault[i].start : first;
+    }
+    return first;
+}
+
+static void forget(hgh_run *self)
+{
+    self->result = (hgh_result){.provisional_at = -1, .confirmed_at = -1};
+}
+
+hgh_run *hgh_run_new(const hgh_run_config *config, uint64_t run)
+{
+    const hg_detector_config *d = config->node->detector;
+    if ((config->signals > HGH_SIGNALS_MAX) || (config->signals != d->signals) || (config->faults > HGH_FAULTS_MAX) ||
+        ((config->plant == NULL) == (config->series == NULL)) ||
+        ((config->plant != NULL) && ((config->plant->n > HGH_STATES_MAX) || (config->plant->p > HGH_STATES_MAX) || (config->plant->nd > HGH_DISTURBANCES_MAX)))) {
+        return NULL;
+    }
+    arena sizes = {NULL, sizeof(hgh_run)};
+    (void)node_memory(&sizes, config->node);
+    (void)take(&sizes, 2U * (size_t)d->signals, sizeof(int32_t));
+    (void)take(&sizes, 2U * (size_t)d->residuals, sizeof(double));
+    hgh_run *self = calloc(1U, sizes.used + 16U);
+    if (self == NULL) {
+        return NULL;
+    }
+    arena a = {(char *)self, sizeof(hgh_run)};
+    const hg_node_memory memory = node_memory(&a, config->node);
+    int32_t *code = take(&a, 2U * (size_t)d->signals, sizeof(int32_t));
+    self->r = take(&a, 2U * (size_t)d->residuals, sizeof(double));
+    self->J = self->r + d->residuals;
+    self->config = *config;
+    self->size = sizes.used;
+    bool good = hg_node_start(&self->node, config->node, &memory, (config->start == (int32_t)HG_START_REST) ? HG_START_REST : HG_START_MOVING) == HG_OK;
+    for (uint8_t g = 0U; good && (g < d->groups); g++) {
+        good = hg_sender_start(&self->sender[g], &config->sender[g], code) == HG_OK;
+        code += 2 * config->sender[g].trigger->width;
+        self->last_event[g] = -1;
+    }
+    if (!good) {
+        free(self);
+        return NULL;
+    }
+    if (config->plant != NULL) {
+        hgh_plant_start(&self->plant, config->plant, config->reference, config->fault, config->faults, config->seed, run);
+        if (config->initial != NULL) {
+            memcpy(self->plant.x, config->initial, (size_t)config->plant->n * sizeof(double));
+        }
+    }
+    hgh_faults_start(&self->faults, config->fault, config->faults, config->sample_time_s, config->seed, run);
+    hgh_random_start(&self->noise, config->seed, run, 4U);
+    hgh_random_start(&self->loss, config->seed, run, 5U);
+    self->fault_start = first_fault(config->fault, config->faults);
+    forget(self);
+    return self;
+}
+
+void hgh_run_free(hgh_run *self)
+{
+    free(self);
+}
+
+void hgh_run_inject(hgh_run *self, const hgh_fault *fault, int32_t count)
+{
+    hgh_faults *faults = (self->config.plant != NULL) ? &self->plant.faults : &self->faults;
+    hgh_faults_start(faults, fault, count, self->config.sample_time_s, self->config.seed, (uint64_t)self->k);
+    for (int32_t i = 0; i < count; i++) {
+        /* The last good value, for a freeze that starts with the next sample. */
+        faults->active[i].frozen = self->reading[fault[i].signal];
+        faults->active[i].held = self->k > 0;
+    }
+    self->fault_start = first_fault(fault, count);
+    forget(self);
+}
+
+static void read_signals(hgh_run *self)
+{
+    const hgh_run_config *c = &self->config;
+    if (c->plant != NULL) {
+        const double *d = (c->disturbance != NULL) ? &c->disturbance[self->k * c->plant->nd] : NULL;
+        hgh_plant_read(&self->plant, d, self->reading);
+        return;
+    }
+    for (int32_t i = 0; i < c->signals; i++) {
+        double value = c->series[self->k * c->signals + i];
+        if (c->noise != NULL) {
+            value += c->noise[i] * hgh_random_signed(&self->noise);
+        }
+        self->reading[i] = hgh_faults_apply(&self->faults, 0, i, self->k, value);
+    }
+}
+
+static void count_event(hgh_run *self, uint8_t group)
+{
+    hgh_result *result = &self->result;
+    if (self->last_event[group] >= 0) {
+        const int64_t interval = self->k - self->last_event[group];
+        result->interval_min = ((result->interval_min == 0) || (interval < result->interval_min)) ? interval : result->interval_min;
+        result->interval_max = (interval > result->interval_max) ? interval : result->interval_max;
+    }
+    self->last_event[group] = self->k;
+    result->measurement++;
+}
+
+static void speak(hgh_run *self, uint8_t group, const double *reading)
+{
+    hg_real value[HG_GROUP_SIGNALS_MAX];
+    hg_can_frame frame;
+    const bool closing = group == self->config.node->closing;
+    for (uint8_t g = 0U; g < self->config.sender[group].trigger->width; g++) {
+        value[g] = (hg_real)reading[g];
+    }
+    if (hg_sender_step(&self->sender[group], (uint32_t)self->k, value, &frame) != HG_OK) {
+        return;
+    }
+    const int64_t bits = (int64_t)hgh_frame_bits(&frame);
+    self->events |= 1U << group;
+    self->bits += bits;
+    if (closing) {
+        self->result.closing++;
+    } else {
+        count_event(self, group);
+        self->result.measurement_bits += bits;
+    }
+    if (!closing && (self->config.loss > 0.0) && (hgh_random_unit(&self->loss) < self->config.loss)) {
+        self->result.lost++;
+    } else {
+        (void)hg_node_receive(&self->node, &frame);
+    }
+}
+
+static double largest_ratio(const hgh_run *self)
+{
+    double ratio = 0.0;
+    for (uint16_t i = 0U; i < self->config.node->detector->residuals; i++) {
+        ratio = fmax(ratio, fabs((double)self->node.detector.r[i]) / (double)self->node.detector.J[i]);
+    }
+    return ratio;
+}
+
+static void judge(hgh_run *self, const hg_verdict *verdict)
+{
+    hgh_result *result = &self->result;
+    const double ratio = largest_ratio(self);
+    if (self->k < self->fault_start) {
+        result->margin = fmax(result->margin, ratio);
+        result->false_provisional += ((verdict->plant >= HG_PLANT_PROVISIONAL) && (self->verdict.plant < HG_PLANT_PROVISIONAL)) ? 1 : 0;
+        result->false_confirmed += ((verdict->plant == HG_PLANT_CONFIRMED) && (self->verdict.plant != HG_PLANT_CONFIRMED)) ? 1 : 0;
+    } else {
+        result->margin_after = fmax(result->margin_after, ratio);
+        if ((verdict->plant >= HG_PLANT_PROVISIONAL) && (result->provisional_at < 0)) {
+            result->provisional_at = self->k;
+            result->candidates = verdict->candidates;
+        }
+        if ((verdict->plant == HG_PLANT_CONFIRMED) && (result->confirmed_at < 0)) {
+            result->confirmed_at = self->k;
+        }
+    }
+    result->plant = (int32_t)verdict->plant;
+    self->verdict = *verdict;
+}
+
+static void step(hgh_run *self)
+{
+    const hg_node_config *node = self->config.node;
+    hg_verdict verdict;
+    hg_can_frame frame[2];
+    self->events = 0U;
+    self->bits = 0;
+    read_signals(self);
+    const double *reading = self->reading;
+    for (uint8_t g = 0U; g < node->detector->groups; g++) {
+        if (g != node->closing) {
+            speak(self, g, reading);
+        }
+        reading += self->config.sender[g].trigger->width;
+    }
+    reading = self->reading;
+    for (uint8_t g = 0U; g < node->closing; g++) {
+        reading += self->config.sender[g].trigger->width;
+    }
+    speak(self, node->closing, reading);
+    while (hg_node_step(&self->node, &verdict) == HG_OK) {
+        const uint8_t frames = hg_node_report(&self->node, &verdict, false, frame);
+        for (uint8_t i = 0U; i < frames; i++) {
+            self->bits += (int64_t)hgh_frame_bits(&frame[i]);
+        }
+        self->result.verdicts += frames;
+        judge(self, &verdict);
+    }
+    self->result.bits += self->bits;
+    if (self->config.plant != NULL) {
+        hgh_plant_move(&self->plant);
+    }
+    self->k++;
+}
+
+bool hgh_run_steps(hgh_run *self, int64_t samples)
+{
+    for (int64_t i = 0; (i < samples) && (self->k < self->config.samples); i++) {
+        step(self);
+    }
+    return self->k < self->config.samples;
+}
+
+const hgh_result *hgh_run_result(const hgh_run *self)
+{
+    return &self->result;
+}
+
+hgh_view hgh_run_view(hgh_run *self)
+{
+    const hg_detector *d = &self->node.detector;
+    for (int32_t i = 0; i < self->config.signals; i++) {
+        self->value[i] = (double)d->value[i];
+        self->radius[i] = (double)d->radius[i];
+    }
+    for (uint16_t i = 0U; i < d->config->residuals; i++) {
+        self->r[i] = (double)d->r[i];
+        self->J[i] = (double)d->J[i];
+    }
+    return (hgh_view){.reading = self->reading,
+                      .value = self->value,
+                      .radius = self->radius,
+                      .r = self->r,
+                      .J = self->J,
+                      .events = self->events,
+                      .plant = (int32_t)self->verdict.plant,
+                      .bus = self->verdict.bus,
+                      .bits = self->bits};
+}
+
+int64_t hgh_batch(const hgh_run_config *config, int64_t first, int64_t count, hgh_result *result)
+{
+    for (int64_t i = 0; i < count; i++) {
+        hgh_run *run = hgh_run_new(config, (uint64_t)(first + i));
+        if (run == NULL) {
+            return i;
+        }
+        (void)hgh_run_steps(run, config->samples);
+        result[i] = run->result;
+        hgh_run_free(run);
+    }
+    return count;
+}
+
+int64_t hgh_sweep(const hgh_run_config *config, const hgh_fault *fault, int32_t faults, int64_t start, int64_t step_by, int64_t starts,
+                  int64_t horizon, int32_t *delay)
+{
+    hgh_run *run = hgh_run_new(config, 0U);
+    hgh_run *saved = (run != NULL) ? malloc(run->size) : NULL;
+    int64_t made = 0;
+    for (int64_t s = 0; (saved != NULL) && (s < starts); s++) {
+        const int64_t begin = start + s * step_by;
+        (void)hgh_run_steps(run, begin - run->k);
+        memcpy(saved, run, run->size); /* its pointers lead into run, where it will be put back */
+        for (int32_t f = 0; f < faults; f++) {
+            hgh_fault moved = fault[f];
+            moved.start = begin;
+            moved.end = (fault[f].end == INT64_MAX) ? INT64_MAX : begin + fault[f].end;
+            hgh_run_inject(run, &moved, 1);
+            (void)hgh_run_steps(run, horizon);
+            delay[s * faults + f] = (run->result.provisional_at < 0) ? -1 : (int32_t)(run->result.provisional_at - begin);
+            memcpy(run, saved, saved->size);
+        }
+        made++;
+    }
+    free(saved);
+    hgh_run_free(run);
+    return made;
+}

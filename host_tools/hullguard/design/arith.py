@@ -1,0 +1,54 @@
+"""Linear algebra whose result does not depend on the processor: plain multiplications and additions in a stated order, no BLAS.
+
+Tables are made with these from numbers that are already rounded in NAME.design.toml, so that they are the same to the byte everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hullguard.model.table import Array
+
+U32 = 2.0**-24  # unit roundoff of float32
+
+
+def mul(a: Array, b: Array) -> Array:
+    """a b, summed in index order."""
+    out = np.zeros((a.shape[0], b.shape[1]))
+    for i in range(a.shape[1]):
+        out += a[:, i, None] * b[None, i, :]
+    return out
+
+
+def row_sums(a: Array) -> Array:
+    """Sum of each row, in index order."""
+    out = np.zeros(a.shape[0])
+    for i in range(a.shape[1]):
+        out += a[:, i]
+    return out
+
+
+def powers(F: Array, G: Array, count: int) -> Array:
+    """F, F G, F G^2, ..: count x rows x order."""
+    out = np.zeros((count, *F.shape))
+    term = F
+    for i in range(count):
+        out[i] = term
+        term = mul(term, G)
+    return out
+
+
+def nearest32(a: Array) -> Array:
+    """Rounded to float32, as float64."""
+    return np.asarray(a, dtype=np.float32).astype(np.float64)
+
+
+def up32(a: Array) -> Array:
+    """The smallest float32 not below each number, as float64."""
+    near = np.asarray(a, dtype=np.float32)
+    return np.where(near.astype(np.float64) < a, np.nextafter(near, np.float32(np.inf)), near).astype(np.float64)
+
+
+def digits(a: Array, n: int = 15) -> Array:
+    """Rounded to n significant decimal digits: what a design file stores."""
+    return np.array([float(f"{x:.{n}g}") for x in np.ravel(a)]).reshape(np.shape(a))

@@ -1,0 +1,299 @@
+"""From a model to a detector: reach, search, post-filter, checks, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hullguard.bus.bits import load_bound
+from hullguard.design import hull, store
+from hullguard.design.arith import digits
+from hullguard.design.checks import Check, generator_checks, refuse
+from hullguard.design.ids import fold
+from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, post_filter, structure
+from hullguard.design.reach import reach
+from hullguard.design.search import FaultPath, search, smallest_faults
+from hullguard.design.store import Stored, StoredObserver
+from hullguard.design.tables import GeneratorTable, GroupTable, Tables, group_table, message_table, rows
+from hullguard.errors import InputError
+from hullguard.model.plant import Feedback
+from hullguard.model.schema import Model, Observer
+from hullguard.model.table import Array
+
+Tick = Callable[[str, int, int], None]  # what is being done, step, of how many
+
+
+@dataclass(frozen=True)
+class Generator:
+    """One residual generator with everything it was made from."""
+
+    spec: Observer
+    plant: SubPlant
+    observer: ObserverMatrices
+    filter: PostFilter
+    linear: hull.Linear
+    tables: hull.HullTables
+    radius: Array  # width: usual radii of its signals
+    smallest: Array  # faults of the spec
+    blind: Array  # the same with a post-filter that does not know of the trigger
+
+
+@dataclass(frozen=True)
+class Design:
+    """A finished design."""
+
+    model: Model
+    stored: Stored
+    generators: tuple[Generator, ...]
+    tables: Tables
+    checks: tuple[Check, ...]
+    load_bound: float
+
+
+def usual_radius(model: Model) -> Array:
+    """Radius that each signal of the vector has most of the time: its trigger's, at half its activity scale, or its quantisation."""
+    radius = np.zeros(len(model.signals))
+    for g in model.groups:
+        t = g.trigger
+        for place, i in enumerate(g.signals):
+            s = model.signals[i]
+            if t.interval_max > 1:
+                radius[i] = float((t.sigma[:, place] + t.delta[:, place] * s.scale / 2).max())
+            elif not g.applied_as_sent:
+                radius[i] = s.resolution / 2
+    return radius
+
+
+def sub_plant(model: Model, spec: Observer, radius: Array) -> SubPlant:
+    """What one generator sees of the plant."""
+    plant, y, u = model.plant, list(spec.outputs), list(spec.inputs)
+    hidden = [i for i in range(plant.p) if i not in u and (np.any(plant.B[:, i]) or np.any(plant.D[:, i]))]
+    places = np.array([model.outputs[i] for i in y], dtype=int)
+    inputs = np.array([model.inputs[i] for i in u], dtype=int)
+    # An input that the generator does not read is a disturbance as large as its range.
+    large = np.array([max(abs(model.signals[model.inputs[i]].low), abs(model.signals[model.inputs[i]].high)) for i in hidden])
+    Ed = np.hstack([plant.Ed, plant.B[:, hidden] * large])
+    Fd = np.hstack([plant.Fd[y], plant.D[y][:, hidden] * large])
+    return SubPlant(plant.A, plant.B[:, u], plant.C[y], plant.D[np.ix_(y, u)], Ed, Fd, radius[places], radius[inputs])
+
+
+def fault_paths(model: Model, spec: Observer, faults: tuple[int, ...]) -> list[FaultPath]:
+    """How unit steps of the named faults reach a generator; faults of signals it does not read have no path of their own."""
+    plant, paths = model.plant, []
+    for f in faults:
+        fault = model.faults[f]
+        into_x, into_value = np.zeros(plant.n), np.zeros(len(spec.outputs) + len(spec.inputs))
+        if fault.type == "actuator":
+            column = model.inputs.index(fault.signal)
+            into_x = plant.B[:, column].copy()
+            into_value[: len(spec.outputs)] = plant.D[list(spec.outputs), column]
+        elif fault.signal in model.outputs:
+            column = model.outputs.index(fault.signal)
+            if column in spec.outputs:
+                into_value[spec.outputs.index(column)] = 1.0
+        else:
+            column = model.inputs.index(fault.signal)
+            if column in spec.inputs:
+                into_value[len(spec.outputs) + spec.inputs.index(column)] = 1.0
+        paths.append(FaultPath(into_x, into_value))
+    return paths
+
+
+def check_observable(model: Model) -> None:
+    """Refuse a plant with a state that no output shows."""
+    plant = model.plant
+    blocks = [plant.C]
+    for _ in range(plant.n - 1):
+        blocks.append(blocks[-1] @ plant.A)
+    _, sigma, Vt = np.linalg.svd(np.vstack(blocks))
+    rank = int(np.sum(sigma > 1e-9 * sigma[0]))
+    if rank < plant.n:
+        worst = plant.states[int(np.argmax(np.abs(Vt[rank:]).max(0)))]
+        raise InputError(f"{model.path.name}: the plant is not observable: the outputs do not show {plant.n - rank} of {plant.n} states, '{worst}' among them; measure it")
+    if np.linalg.matrix_rank(plant.C) < plant.m:
+        raise InputError(f"{model.path.name}: two outputs measure the same combination of states (C has not full row rank); drop one")
+
+
+def find(model: Model, tick: Tick) -> Stored:
+    """All that needs a search or a solver, rounded for the design file."""
+    check_observable(model)
+    horizon = max(g.trigger.interval_max + g.trigger.margin for g in model.groups)
+    plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B))
+    if plant.feedback is not None:
+        plant = replace(plant, feedback=Feedback(digits(plant.feedback.gain), plant.feedback.reference_bound))
+    model = replace(model, plant=plant)
+    reached = reach(model, horizon)
+    radius = usual_radius(model)
+    observers = []
+    for i, spec in enumerate(model.observers):
+        sub = sub_plant(model, spec, radius)
+        where = f"{model.path.name}: detector.observers[{i}]"
+        basis = check_parity(sub, spec.order, where)
+        paths = fault_paths(model, spec, spec.faults)
+        steps = iter(range(1, spec.search.trials + 1))
+
+        def step(i: int = i, steps: object = steps, trials: int = spec.search.trials) -> None:
+            tick(f"generator {i + 1} of {len(model.observers)}", next(steps), trials)  # type: ignore[call-overload]
+
+        own = np.concatenate([sub.Sy, sub.Su])
+        best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, step)
+        o, f = best.observer, best.filter
+        observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
+    gain = plant.feedback.gain if plant.feedback is not None else None
+    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), tuple(observers))
+
+
+def refilter(model: Model, old: Stored) -> Stored:
+    """A stored design for a model whose triggers, bounds or ranges have changed: parity vectors and poles stay, the rest is made anew."""
+    fresh = replace(model, observers=())
+    found = find(fresh, lambda *_: None)
+    radius = usual_radius(model)
+    observers = []
+    for spec, stored in zip(model.observers, old.observers, strict=True):
+        sub = sub_plant(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), spec, radius)
+        G, H, L, T = structure(sub, stored.v, stored.gamma)
+        f = post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
+        observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
+    return replace(found, observers=tuple(observers))
+
+
+def _fits(model: Model, old: Stored) -> bool:
+    """Can the stored parity vectors serve this model: same plant, same shapes?"""
+    same_plant = old.A.shape == model.plant.A.shape and np.allclose(old.A, model.plant.A, 0, 1e-12) and np.allclose(old.B, model.plant.B, 0, 1e-12)
+    shapes = len(old.observers) == len(model.observers) and all(
+        o.v.shape == (s.order + 1, len(s.outputs)) and o.W.shape[0] <= s.residuals for o, s in zip(old.observers, model.observers, strict=False)
+    )
+    return bool(same_plant and shapes)
+
+
+def stored_for(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
+    """The stored numbers of a model, and whether they are the file's own. A search is made only where the file does not help."""
+    path = store.path_of(model.path)
+    if path.exists() and not fresh:
+        old = store.read(path)
+        if old.model_sha256 == model.sha256:
+            return old, True
+        if _fits(model, old):
+            return refilter(model, old), False
+    return find(model, tick), False
+
+
+def finish(model: Model, stored: Stored) -> Design:
+    """Checks and tables from a model and its stored numbers: plain arithmetic."""
+    plant = replace(model.plant, A=stored.A, B=stored.B)
+    if stored.gain is not None and plant.feedback is not None:
+        plant = replace(plant, feedback=Feedback(stored.gain, plant.feedback.reference_bound))
+    model = replace(model, plant=plant)
+    radius = usual_radius(model)
+    groups = tuple(group_table(model, g, stored.slew) for g in model.groups)
+    generators = tuple(_generator(model, i, stored, radius) for i in range(len(model.observers)))
+    tables = _tables(model, groups, generators)
+    _unique_ids(model, tables)
+    bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
+    checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear)]
+    checks += _model_checks(model, stored, tables, bound, generators)
+    refuse(model.path.name, checks)
+    return Design(model, stored, generators, tables, tuple(checks), bound)
+
+
+def _unique_ids(model: Model, tables: Tables) -> None:
+    messages = [g.message for g in tables.groups] + [tables.verdict, tables.status]
+    for a in messages:
+        for b in messages:
+            if a is not b and a.data_id == b.data_id:
+                raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{a.data_id[0]:02X}; give one another data_id")
+
+
+def _largest(model: Model, stored: Stored, place: int) -> float:
+    """Largest magnitude of a healthy signal: what it can reach, or its declared range."""
+    s = model.signals[place]
+    declared = max(abs(s.low), abs(s.high))
+    reached = float(stored.signal_reach[place])
+    if not np.isfinite(reached):
+        return declared
+    centre = abs(float(model.plant.C[model.outputs.index(place)] @ model.plant.equilibrium)) if place in model.outputs else 0.0
+    return min(declared, reached + centre + s.resolution)
+
+
+def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator:
+    spec, found = model.observers[i], stored.observers[i]
+    sub = sub_plant(model, spec, radius)
+    G, H, L, T = structure(sub, found.v, found.gamma)
+    o = ObserverMatrices(found.v, found.gamma, G, H, L, T, found.W, found.V, found.V @ sub.D)
+    solved = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, spec.aware)
+    f = replace(solved, Lo=found.Lo, Mo=found.Mo)
+    linear = hull.rounded(*fused(o, f))
+    plant = model.plant
+    outputs, inputs = [model.outputs[k] for k in spec.outputs], [model.inputs[k] for k in spec.inputs]
+    values = np.array([_largest(model, stored, k) for k in outputs + inputs])
+    ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :])
+    own = radius[outputs + inputs]
+    longest = max(g.trigger.interval_max for g in model.groups)
+    table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]")
+    paths = fault_paths(model, spec, spec.faults)
+    blind = np.full(len(paths), np.inf)
+    if paths:
+        try:
+            plain = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, False)
+            blind = smallest_faults(sub, o, plain, paths, own)
+        except (np.linalg.LinAlgError, ValueError):
+            pass  # without the event error the factorisation may not exist; then there is nothing to compare with
+    return Generator(spec, sub, o, f, linear, table, own, found.smallest, blind)
+
+
+def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...]) -> Tables:
+    made = []
+    for g in generators:
+        signal = [model.outputs[k] for k in g.spec.outputs] + [model.inputs[k] for k in g.spec.inputs]
+        used = np.any(g.tables.weight > 0, axis=(0, 1)) | (g.tables.tail_input > 0)
+        feeds = sum(1 << i for i, group in enumerate(model.groups) if any(used[signal.index(s)] for s in group.signals if s in signal))
+        paths = fault_paths(model, g.spec, tuple(range(len(model.faults))))
+        size = smallest_faults(g.plant, g.observer, g.filter, paths, g.radius) if paths else np.zeros(0)
+        faults = sum(1 << i for i, s in enumerate(size) if s < 1e9)
+        made.append(
+            GeneratorTable(
+                signal=tuple(signal),
+                state=rows(g.linear.state),
+                input=rows(g.linear.input),
+                output=rows(g.linear.output),
+                direct=rows(g.linear.direct),
+                taps=g.tables.weight.shape[0],
+                weight=tuple(rows(w) for w in g.tables.weight),
+                settle=g.tables.rest.shape[0],
+                rest=rows(g.tables.rest),
+                moving=rows(g.tables.moving),
+                ready_rest=g.tables.ready_rest,
+                ready_moving=g.tables.ready_moving,
+                decay=g.tables.decay,
+                tail_input=tuple(float(x) for x in g.tables.tail_input),
+                tail_output=tuple(float(x) for x in g.tables.tail_output),
+                feeds=feeds,
+                faults=faults,
+            )
+        )
+    verdict, status = message_table("verdict", model.verdict, 8), message_table("status", model.status, 8)
+    return Tables(model.name, groups, model.closing, tuple(made), model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat)
+
+
+def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, generators: tuple[Generator, ...]) -> list[Check]:
+    checks = []
+    for i, s in enumerate(model.signals):
+        if np.isfinite(stored.signal_reach[i]):
+            offset = abs(float(model.plant.C[model.outputs.index(i)] @ model.plant.equilibrium)) if i in model.outputs else 0.0
+            limit = min(-s.low, s.high) if s.low < 0 < s.high else max(abs(s.low), abs(s.high))
+            checks.append(Check(f"reach of {s.name}", float(stored.signal_reach[i]) + offset, limit, f"widen its range to at least {stored.signal_reach[i] + offset:.3g}, or bound the reference more tightly"))
+    checks.append(Check("bus load, worst case", bound, model.load_max, "raise bitrate_bps, the trigger's silence or the sample time"))
+    for i, g in enumerate(generators):
+        share = float((g.tables.rounding / g.tables.steady).max())
+        checks.append(Check(f"rounding share of threshold {i + 1}", share, 0.5, "choose poles further inside the unit circle, or narrower ranges"))
+    for group in tables.groups:
+        checks.append(Check(f"counter alias of {group.name}", group.interval_max + group.margin, 16 * (min(group.silence) + 1) - 1, "shorten interval_max or margin"))
+    return checks
+
+
+def design(model: Model, fresh: bool = False, tick: Tick | None = None) -> tuple[Design, bool]:
+    """Design a model; the flag says whether the stored numbers are the design file's own."""
+    stored, own = stored_for(model, fresh, tick or (lambda *_: None))
+    return finish(model, stored), own

@@ -1,0 +1,166 @@
+"""Variable-order observer and optimal post-filter; platoon, sections 2 and 3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from hullguard.design.arith import mul
+from hullguard.errors import InputError
+from hullguard.model.table import Array
+
+RANK_TOLERANCE = 1e-10  # of |T|_F, absolute: a default tolerance loses W in one design of eleven
+
+
+@dataclass(frozen=True)
+class SubPlant:
+    """The part of a plant that one generator sees: all states, some outputs and inputs."""
+
+    A: Array  # n x n
+    B: Array  # n x p
+    C: Array  # m x n
+    D: Array  # m x p
+    Ed: Array  # n x nd
+    Fd: Array  # m x nd
+    Sy: Array  # m: expected event error of each output, for the trigger-aware post-filter
+    Su: Array  # p: expected event error of each input
+
+
+@dataclass(frozen=True)
+class ObserverMatrices:
+    """z(k+1) = G z + H u + L y, r0 = V y - W z - Qu u with T A - G T = L C, H = T B - L D, V C = W T, Qu = V D."""
+
+    v: Array  # (s+1) x m parity vector
+    gamma: Array  # s: last column of G
+    G: Array
+    H: Array
+    L: Array
+    T: Array
+    W: Array
+    V: Array
+    Qu: Array
+
+
+@dataclass(frozen=True)
+class PostFilter:
+    """R(z) = Mo - Mo W (zI - G + Lo W)^-1 Lo with what its checks need."""
+
+    Lo: Array
+    Mo: Array
+    X: Array
+    S: Array
+    Eb: Array
+    Fb: Array
+    regularised: float  # epsilon added to Fb, 0 in the regular case
+
+
+def parity_basis(plant: SubPlant, order: int) -> Array:
+    """Rows span the left null space of [C; CA; ..; CA^s]."""
+    blocks = [plant.C]
+    for _ in range(order):
+        blocks.append(blocks[-1] @ plant.A)
+    return np.asarray(scipy.linalg.null_space(np.vstack(blocks).T).T)
+
+
+def smallest_order(plant: SubPlant, limit: int) -> int | None:
+    """Smallest order with a parity vector."""
+    return next((s for s in range(1, limit + 1) if parity_basis(plant, s).size), None)
+
+
+def gamma_of(poles: Array) -> Array:
+    """Last column of the companion matrix with these poles: z^s = gamma_s z^(s-1) + .. + gamma_1."""
+    return np.asarray(-np.poly(poles)[::-1][: len(poles)].real)
+
+
+def structure(plant: SubPlant, v: Array, gamma: Array) -> tuple[Array, Array, Array, Array]:
+    """G, H, L, T of a parity vector and a pole vector; sums in index order, so that a stored design gives the same bits everywhere."""
+    s = len(gamma)
+    G = np.zeros((s, s))
+    G[1:, :-1] = np.eye(s - 1)
+    G[:, -1] = gamma
+    L = -v[:s] - np.outer(gamma, v[s])
+    T = np.zeros((s, plant.A.shape[0]))
+    block = plant.C
+    for j in range(s):
+        for i in range(s - j):
+            T[i] += mul(v[None, i + j + 1], block)[0]
+        block = mul(block, plant.A)
+    return G, mul(T, plant.B) - mul(L, plant.D), L, T
+
+
+def output_map(plant: SubPlant, T: Array) -> tuple[Array, Array]:
+    """All of W (rows span the left null space of T C_perp) and V = W T C'(C C')^-1."""
+    s = T.shape[0]
+    perp = scipy.linalg.null_space(plant.C)
+    if perp.shape[1] == 0:
+        W = np.eye(s)
+    else:
+        U, sigma, _ = np.linalg.svd(T @ perp)
+        rank = int(np.sum(sigma > RANK_TOLERANCE * np.linalg.norm(T)))
+        W = U[:, rank:].T
+    return W, W @ T @ plant.C.T @ np.linalg.inv(plant.C @ plant.C.T)
+
+
+def best_rows(W: Array, V: Array, G: Array, responses: list[tuple[Array, Array]], count: int) -> tuple[Array, Array]:
+    """The `count` combinations of rows of W in which the faults show most; responses are (column into e = T x - z, column into y)."""
+    if W.shape[0] <= count:
+        return W, V
+    columns = []
+    for into_e, into_y in responses:
+        e = np.zeros(G.shape[0])
+        for _ in range(4 * G.shape[0]):
+            columns.append(V @ into_y + W @ e)
+            e = G @ e + into_e
+    U = np.linalg.svd(np.array(columns).T)[0]
+    R = U[:, :count].T
+    return R @ W, R @ V
+
+
+def normal_rank(G: Array, W: Array, Eb: Array, Fb: Array) -> int:
+    """Normal rank of the transfer matrix from d to r0, at a point where nothing special happens."""
+    z = 1.7 + 0.9j
+    M = Fb + W @ np.linalg.solve(z * np.eye(G.shape[0]) - G, Eb)
+    return int(np.linalg.matrix_rank(M))
+
+
+def post_filter(plant: SubPlant, G: Array, L: Array, H: Array, T: Array, W: Array, V: Array, Qu: Array, aware: bool) -> PostFilter:
+    """Co-inner-outer factorisation; with `aware` the event error is one more disturbance."""
+    Eb, Fb = T @ plant.Ed - L @ plant.Fd, V @ plant.Fd
+    if aware:
+        Eb = np.hstack([Eb, -L * plant.Sy, -H * plant.Su])
+        Fb = np.hstack([Fb, V * plant.Sy, -Qu * plant.Su])
+    rows = W.shape[0]
+    epsilon = 0.0
+    if normal_rank(G, W, Eb, Fb) < rows:
+        # The factorisation is singular: noise that no one claims keeps it regular, and the report says so.
+        epsilon = 1e-6 * max(float(np.linalg.norm(Fb)), float(np.linalg.norm(Eb)), 1e-12)
+        Eb = np.hstack([Eb, np.zeros((Eb.shape[0], rows))])
+        Fb = np.hstack([Fb, epsilon * np.eye(rows)])
+    X = scipy.linalg.solve_discrete_are(G.T, W.T, Eb @ Eb.T, Fb @ Fb.T, s=Eb @ Fb.T)
+    S = W @ X @ W.T + Fb @ Fb.T
+    S = (S + S.T) / 2
+    values, vectors = np.linalg.eigh(S)
+    if values[0] <= 0.0:
+        raise np.linalg.LinAlgError("S is not positive definite")
+    Lo = np.linalg.solve(S, (G @ X @ W.T + Eb @ Fb.T).T).T
+    Mo = vectors @ np.diag(values**-0.5) @ vectors.T
+    return PostFilter(Lo, Mo, X, S, Eb, Fb, epsilon)
+
+
+def fused(o: ObserverMatrices, f: PostFilter) -> tuple[Array, Array, Array, Array]:
+    """State, input, output and direct matrices of observer and post-filter in one, signals ordered [y; u]; platoon, section 3."""
+    state = o.G - mul(f.Lo, o.W)
+    inputs = np.hstack([o.L + mul(f.Lo, o.V), o.H - mul(f.Lo, o.Qu)])
+    return state, inputs, -mul(f.Mo, o.W), np.hstack([mul(f.Mo, o.V), -mul(f.Mo, o.Qu)])
+
+
+def check_parity(plant: SubPlant, order: int, where: str) -> Array:
+    """The parity basis at this order; refuses an order that has none and says which would do."""
+    basis = parity_basis(plant, order)
+    if basis.size == 0:
+        least = smallest_order(plant, 2 * plant.A.shape[0] + 2)
+        cure = f"the smallest order that has one is {least}" if least else "no order has one with these outputs"
+        raise InputError(f"{where}: no parity vector at order {order}; {cure}")
+    return basis

@@ -1,0 +1,126 @@
+"""What an undisturbed or disturbed, but healthy, plant can reach: ranges of states and signals, and slews; platoon, section 4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hullguard.errors import InputError
+from hullguard.model.schema import Model, Signal
+from hullguard.model.table import Array
+
+HORIZON_MAX = 20_000
+SETTLED = 1e-9
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Largest magnitudes of states, signal bounds and slews of the operating set."""
+
+    state: Array  # n: |x_i| never exceeds
+    signal: Array  # signals: |s_i - equilibrium s_i| of the healthy plant, or nan where it is taken from the declared range
+    slew: Array  # signals x horizon: |s(k+j) - s(k)| for j = 1 ..
+
+
+def _closed_loop(model: Model) -> tuple[Array, Array, Array, Array, Array] | None:
+    """A, input matrix and output maps of the emulated loop: w = (reference, quantisation of u, d) |w| <= 1, s = all signals."""
+    plant = model.plant
+    if plant.feedback is None:
+        return None
+    K = plant.feedback.gain
+    half = np.array([model.signals[i].resolution / 2 for i in model.inputs])
+    drive = np.hstack([np.diag(plant.feedback.reference_bound), np.diag(half)])
+    nd = plant.Ed.shape[1]
+    A = plant.A - plant.B @ K
+    Bw = np.hstack([plant.B @ drive, plant.Ed])
+    Cs, Dw = np.zeros((len(model.signals), plant.n)), np.zeros((len(model.signals), Bw.shape[1]))
+    for row, i in enumerate(model.outputs):
+        Cs[i] = plant.C[row] - plant.D[row] @ K
+        Dw[i] = np.hstack([plant.D[row] @ drive, plant.Fd[row]])
+    for row, i in enumerate(model.inputs):
+        Cs[i] = -K[row]
+        Dw[i] = np.hstack([drive[row], np.zeros(nd)])
+    return A, Bw, Cs, Dw, plant.initial_range
+
+
+def _declared_slew(signal: Signal, horizon: int) -> Array:
+    """Declared values, continued by |y(k+a+b) - y(k)| <= slew(a) + slew(b)."""
+    known = list(signal.slew or ())
+    while len(known) < horizon:
+        j = len(known) + 1
+        known.append(min(known[a - 1] + known[j - a - 1] for a in range(1, j)))
+    return np.minimum(np.array(known[:horizon]), signal.high - signal.low)
+
+
+def reach(model: Model, horizon: int) -> Reach:
+    """Reachable set of the model's closed loop where it is asked for, declared ranges and slews elsewhere."""
+    count = len(model.signals)
+    spans = np.array([s.high - s.low for s in model.signals])
+    signal, slew = np.full(count, np.nan), np.tile(spans[:, None], (1, horizon))
+    loop = _closed_loop(model)
+    wanted = [i for i, s in enumerate(model.signals) if s.slew is None]
+    state = np.full(model.plant.n, np.inf)
+    if loop is not None and np.abs(np.linalg.eigvals(loop[0])).max() < 1.0:
+        state, signal, computed = _sums(*loop, horizon)
+        state += np.abs(model.plant.equilibrium)
+        for i in wanted:
+            slew[i] = np.minimum(computed[i], spans[i])
+    else:
+        for i in wanted:
+            if model.signals[i].role == "output":
+                raise InputError(
+                    f"signal '{model.signals[i].name}': slew = \"reachable\" needs [plant] feedback with a stable loop; declare the slew as a list"
+                )
+    for i, s in enumerate(model.signals):
+        if s.slew is not None:
+            slew[i] = _declared_slew(s, horizon)
+    return Reach(_declared_states(model, state), signal, slew)
+
+
+def _declared_states(model: Model, state: Array) -> Array:
+    """A state that is itself an output stays within that output's range; any other needs the reachable set."""
+    plant = model.plant
+    out = state.copy()
+    for row, i in enumerate(model.outputs):
+        places = np.flatnonzero(plant.C[row])
+        if len(places) == 1 and not plant.D[row].any():
+            s = model.signals[i]
+            bound = max(abs(s.low), abs(s.high)) / abs(plant.C[row, places[0]])
+            out[places[0]] = min(out[places[0]], bound)
+    if not np.all(np.isfinite(out)):
+        name = plant.states[int(np.flatnonzero(~np.isfinite(out))[0])]
+        raise InputError(f"state '{name}' has no bound: measure it, or give [plant] feedback with a stable loop so that its reach can be computed")
+    return out
+
+
+def _sums(A: Array, Bw: Array, Cs: Array, Dw: Array, initial: Array, horizon: int) -> tuple[Array, Array, Array]:
+    """Largest |x|, |s| and |s(k+j) - s(k)| over all |w| <= 1 and |x(0)| <= initial.
+
+    Sums of absolute impulse responses, taken at each k and then maximised over k: while the initial state is still felt, little of the
+    disturbance's history is. `horizon` is the largest j.
+    """
+    responses, starts = [Dw], [Cs * initial]
+    states, state_starts = [np.zeros(A.shape[0])], [initial.copy()]
+    power = np.eye(A.shape[0])
+    for _ in range(HORIZON_MAX):
+        step = power @ Bw
+        responses.append(Cs @ step)
+        states.append(states[-1] + np.abs(step).sum(1))
+        power = A @ power
+        starts.append(Cs @ power * initial)
+        state_starts.append(np.abs(power) @ initial)
+        if np.abs(power).max() < SETTLED:
+            break
+    h, x0 = np.array(responses), np.array(starts)
+    state = (np.array(states) + np.array(state_starts)).max(0)
+    signal = (np.abs(h).sum(2).cumsum(0) + np.abs(x0).sum(2)).max(0)
+    slew = np.zeros((Cs.shape[0], horizon))
+    for j in range(1, horizon + 1):
+        shifted = np.concatenate([np.zeros((j, *Dw.shape)), h])
+        extended = np.concatenate([h, np.zeros((j, *Dw.shape))])
+        # Row k + j: everything that w(0) .. w(k + j) can do to s(k + j) - s(k).
+        driven = np.abs(extended - shifted).sum(2).cumsum(0)[j:]
+        later = np.concatenate([x0[j:], np.zeros((j, *x0.shape[1:]))])
+        slew[:, j - 1] = (driven + np.abs(later - x0).sum(2)).max(0)
+    return state, signal, slew

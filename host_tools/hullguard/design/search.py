@@ -1,0 +1,108 @@
+"""Search of the free parameters of a generator, parity vector and poles, for the smallest fault that shows; platoon, section 3."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hullguard.design.arith import digits
+from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, best_rows, fused, gamma_of, output_map, post_filter, structure
+from hullguard.errors import InputError
+from hullguard.model.schema import Search
+from hullguard.model.table import Array
+
+HORIZON = 60  # samples in which a step fault has to show
+LAGS = 2048  # of the impulse response that the score adds up
+SETTLED = 1e-8
+
+
+@dataclass(frozen=True)
+class FaultPath:
+    """How a unit step of one fault enters: into x by `into_x`, or into the value of one output or input."""
+
+    into_x: Array  # n
+    into_value: Array  # width of [y; u]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One point of the search with its score."""
+
+    observer: ObserverMatrices
+    filter: PostFilter
+    smallest: Array  # faults: size whose response reaches the threshold, inf where it never does
+
+
+def make(plant: SubPlant, v: Array, poles: Array, residuals: int, paths: list[FaultPath], aware: bool) -> tuple[ObserverMatrices, PostFilter]:
+    """Observer and post-filter of a parity vector (s+1 x m) and poles (s). Raises LinAlgError or ValueError where there is none."""
+    v = digits(v)
+    gamma = digits(gamma_of(poles))
+    G, H, L, T = structure(plant, v, gamma)
+    W, V = output_map(plant, T)
+    if W.shape[0] == 0:
+        raise np.linalg.LinAlgError("no output map")
+    m = plant.C.shape[0]
+    responses = [(T @ p.into_x - L @ p.into_value[:m] - H @ p.into_value[m:], p.into_value[:m]) for p in paths]
+    W, V = best_rows(W, V, G, responses, min(residuals, m))
+    W, V = digits(W), digits(V)
+    Qu = V @ plant.D
+    f = post_filter(plant, G, L, H, T, W, V, Qu, aware)
+    return ObserverMatrices(v, gamma, G, H, L, T, W, V, Qu), f
+
+
+def smallest_faults(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: list[FaultPath], radius: Array) -> Array:
+    """For each fault the size whose largest response within the horizon equals the steady threshold at these radii."""
+    state, inputs, output, direct = fused(o, f)
+    m = plant.C.shape[0]
+    Bd = o.T @ plant.Ed - inputs[:, :m] @ plant.Fd
+    errors = np.hstack([Bd, inputs * radius])
+    # e = T x - z: a fault enters it by x, or with the other sign by the value that z reads; r = -output e + direct value.
+    into_e = [o.T @ p.into_x - inputs @ p.into_value for p in paths]
+    block = np.hstack([errors, *(c[:, None] for c in into_e)])
+    P, step = output[None], state
+    while P.shape[0] < LAGS and (P.shape[0] < HORIZON or np.abs(P[-1]).max() > SETTLED * np.abs(output).max()):
+        P, step = np.concatenate([P, P @ step]), step @ step
+    R = P @ block
+    J = np.abs(direct[:, :m] @ plant.Fd).sum(1) + np.abs(direct * radius).sum(1) + np.abs(R[:, :, : errors.shape[1]]).sum((0, 2))
+    answers = -R[:HORIZON, :, errors.shape[1] :]
+    at_once = np.array([direct @ p.into_value for p in paths]).T
+    steps = np.concatenate([at_once[None], at_once + answers.cumsum(0)])
+    peak = (np.abs(steps) / J[None, :, None]).max((0, 1))
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / peak)
+
+
+def _draw(rng: np.random.Generator, plant: SubPlant, basis: Array, order: int, poles: tuple[float, float]) -> tuple[Array, Array]:
+    v = (rng.standard_normal(basis.shape[0]) @ basis).reshape(order + 1, plant.C.shape[0])
+    return v, rng.uniform(*poles, order)
+
+
+def search(
+    plant: SubPlant, basis: Array, order: int, residuals: int, paths: list[FaultPath], radius: Array, aware: bool, setting: Search, tick: Callable[[], None]
+) -> Candidate:
+    """Random trials for two thirds of the budget, then steps around the best; the same seed gives the same result on one machine."""
+    rng = np.random.default_rng(setting.seed)
+    best: Candidate | None = None
+    centre: tuple[Array, Array] | None = None
+    step = 0.3
+    for trial in range(setting.trials):
+        tick()
+        if centre is None or 3 * trial < 2 * setting.trials:
+            v, poles = _draw(rng, plant, basis, order, setting.poles)
+        else:
+            dv, _ = _draw(rng, plant, basis, order, setting.poles)
+            v = centre[0] + step * np.linalg.norm(centre[0]) / np.linalg.norm(dv) * dv
+            poles = np.clip(centre[1] + 0.2 * step * rng.standard_normal(order), *setting.poles)
+            step = max(step * 0.995, 0.01)
+        try:
+            o, f = make(plant, v, poles, residuals, paths, aware)
+        except (np.linalg.LinAlgError, ValueError):
+            continue
+        smallest = smallest_faults(plant, o, f, paths, radius) if paths else np.zeros(1)
+        if best is None or smallest.max() < best.smallest.max():
+            best, centre = Candidate(o, f, smallest), (v, poles)
+    if best is None:
+        raise InputError("the search found no generator: more trials, other poles or another order may")
+    return best

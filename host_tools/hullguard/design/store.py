@@ -1,0 +1,125 @@
+"""NAME.design.toml: the numbers a search or a solver found, rounded, so that everything after them is plain arithmetic."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from hullguard.errors import InputError
+from hullguard.model.table import Array, Table
+
+VERSION = 1
+HEADER = "# Made by `hullguard design` from {name}.toml. Do not edit: run it again.\n\n"
+
+
+@dataclass(frozen=True)
+class StoredObserver:
+    """One generator: parity vector, poles' companion column, output map, post-filter, and what the search reached."""
+
+    v: Array
+    gamma: Array
+    W: Array
+    V: Array
+    Lo: Array
+    Mo: Array
+    regularised: float
+    smallest: Array
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A design file."""
+
+    model_sha256: str
+    A: Array
+    B: Array
+    gain: Array | None
+    state_range: Array
+    signal_reach: Array
+    slew: Array
+    observers: tuple[StoredObserver, ...]
+
+
+def path_of(model_path: Path) -> Path:
+    """Where the design of a model file lives."""
+    return model_path.with_name(model_path.stem + ".design.toml")
+
+
+def write(path: Path, name: str, stored: Stored) -> None:
+    """Write a design file; the same data gives the same bytes."""
+    data: dict[str, Any] = {
+        "version": VERSION,
+        "model_sha256": stored.model_sha256,
+        "plant": {"A": stored.A.tolist(), "B": stored.B.tolist(), "state_range": stored.state_range.tolist()},
+        "signals": {"reach": [float(x) if np.isfinite(x) else -1.0 for x in stored.signal_reach], "slew": stored.slew.tolist()},
+        "observers": [
+            {
+                "parity": o.v.tolist(),
+                "gamma": o.gamma.tolist(),
+                "W": o.W.tolist(),
+                "V": o.V.tolist(),
+                "Lo": o.Lo.tolist(),
+                "Mo": o.Mo.tolist(),
+                "regularised": o.regularised,
+                "smallest_fault": [float(x) if np.isfinite(x) else -1.0 for x in o.smallest],
+            }
+            for o in stored.observers
+        ],
+    }
+    if stored.gain is not None:
+        data["plant"]["gain"] = stored.gain.tolist()
+    path.write_text(HEADER.format(name=name) + tomli_w.dumps(data), encoding="utf-8")
+
+
+def read(path: Path) -> Stored:
+    """Read a design file."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path.name}: not a readable design file ({error}); run hullguard design again") from error
+    top = Table(data, path.name)
+    if top.whole("version", 0, 10_000) != VERSION:
+        raise InputError(f"{path.name}: written by another version; run hullguard design again")
+    plant, signals = top.table("plant"), top.table("signals")
+    observers = []
+    for t in top.tables("observers"):
+        v = t.matrix("parity")
+        order, m = v.shape[0] - 1, v.shape[1]
+        W = t.matrix("W", None, order)
+        rows = W.shape[0]
+        smallest = t.vector("smallest_fault")
+        observers.append(
+            StoredObserver(
+                v=v,
+                gamma=t.vector("gamma", order),
+                W=W,
+                V=t.matrix("V", rows, m),
+                Lo=t.matrix("Lo", order, rows),
+                Mo=t.matrix("Mo", rows, rows),
+                regularised=t.number("regularised", 0.0),
+                smallest=np.where(smallest < 0, np.inf, smallest),
+            )
+        )
+        t.close()
+    A = plant.matrix("A")
+    inputs = plant.raw("B")
+    B = plant.matrix("B", A.shape[0]) if inputs and inputs[0] else np.zeros((A.shape[0], 0))
+    reach = signals.vector("reach")
+    stored = Stored(
+        model_sha256=top.text("model_sha256"),
+        A=A,
+        B=B,
+        gain=plant.matrix("gain", B.shape[1], A.shape[0]) if "gain" in plant else None,
+        state_range=plant.vector("state_range", A.shape[0], 0.0),
+        signal_reach=np.where(reach < 0, np.nan, reach),
+        slew=signals.matrix("slew", len(reach)),
+        observers=tuple(observers),
+    )
+    for t in (plant, signals, top):
+        t.close()
+    return stored

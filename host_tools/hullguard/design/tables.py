@@ -1,0 +1,227 @@
+"""Everything that the C library needs of one model: plain numbers, the same for generated C and for structures filled at run time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from hullguard.design.arith import U32, nearest32, up32
+from hullguard.design.ids import data_ids
+from hullguard.errors import InputError
+from hullguard.model.schema import Frame, Group, Model, Signal
+from hullguard.model.table import Array
+
+CODE_BITS_MAX = 24  # float32 holds every code of that many bits exactly
+EXTENDED, FD, BRS = 0x01, 0x04, 0x08
+MOTOROLA, SIGNED, FLOAT32 = 0x01, 0x02, 0x04
+HEADER_BITS = 16
+
+
+@dataclass(frozen=True)
+class SignalTable:
+    """hg_code_scale, hg_field and the hold's numbers of one signal."""
+
+    name: str
+    resolution: float
+    offset: float
+    per_unit: float
+    minimum: int
+    maximum: int
+    start: int
+    length: int
+    flags: int
+    half: float
+    span: float
+    middle: float
+    zero: int
+
+
+@dataclass(frozen=True)
+class MessageTable:
+    """hg_message."""
+
+    name: str
+    id: int
+    flags: int
+    length: int
+    data_id: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GroupTable:
+    """One group: trigger, hold and message."""
+
+    name: str
+    first: int
+    signals: tuple[SignalTable, ...]
+    message: MessageTable
+    levels: int
+    interval_max: int
+    margin: int
+    silence: tuple[int, ...]
+    delta: tuple[tuple[int, ...], ...]
+    sigma: tuple[tuple[int, ...], ...]
+    activity: tuple[tuple[int, ...], ...]
+    slew: tuple[tuple[float, ...], ...]  # interval_max + margin x width
+
+
+@dataclass(frozen=True)
+class GeneratorTable:
+    """hg_residual_config and hg_hull_config."""
+
+    signal: tuple[int, ...]
+    state: tuple[tuple[float, ...], ...]
+    input: tuple[tuple[float, ...], ...]
+    output: tuple[tuple[float, ...], ...]
+    direct: tuple[tuple[float, ...], ...]
+    taps: int
+    weight: tuple[tuple[tuple[float, ...], ...], ...]
+    settle: int
+    rest: tuple[tuple[float, ...], ...]
+    moving: tuple[tuple[float, ...], ...]
+    ready_rest: int
+    ready_moving: int
+    decay: float
+    tail_input: tuple[float, ...]
+    tail_output: tuple[float, ...]
+    feeds: int
+    faults: int
+
+
+@dataclass(frozen=True)
+class Tables:
+    """hg_node_config with all that hangs on it."""
+
+    name: str
+    groups: tuple[GroupTable, ...]
+    closing: int
+    generators: tuple[GeneratorTable, ...]
+    up: int
+    down: int
+    latch: bool
+    verdict: MessageTable
+    status: MessageTable
+    heartbeat: int
+
+    @property
+    def signals(self) -> int:
+        """Length of the signal vector."""
+        return sum(len(g.signals) for g in self.groups)
+
+    @property
+    def history(self) -> int:
+        """Rows of the ring of radii."""
+        return max(g.taps for g in self.generators) + 1
+
+    @property
+    def residuals(self) -> int:
+        """Residuals of all generators together."""
+        return sum(len(g.output) for g in self.generators)
+
+    @property
+    def hash(self) -> int:
+        """32 bits that change with any number above: host and node compare them."""
+        text = json.dumps(_plain(self), sort_keys=True, separators=(",", ":"))
+        return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
+
+
+def _plain(value: Any) -> Any:
+    """Data with every float as its exact hexadecimal text."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {k: _plain(v) for k, v in asdict(value).items()}
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    return value.hex() if isinstance(value, float) else value
+
+
+def rows(a: Array) -> tuple[tuple[float, ...], ...]:
+    """A matrix as nested tuples."""
+    return tuple(tuple(float(x) for x in r) for r in a)
+
+
+def signal_table(s: Signal, start: int, exact: bool) -> SignalTable:
+    """Codes and the wire of one signal. `exact`: the receiver's value is the truth (an input applied as sent)."""
+    resolution = float(nearest32(np.array(s.resolution)))
+    offset = 0.0
+    if s.low > 0 or s.high < 0:
+        offset = float(nearest32(np.array(round((s.low + s.high) / 2 / resolution) * resolution)))
+    minimum, maximum = round((s.low - offset) / resolution), round((s.high - offset) / resolution)
+    bits = max(maximum, -minimum - 1, 1).bit_length() + 1
+    if minimum < -(2 ** (bits - 1)) + 1:
+        bits += 1  # the most negative pattern stands for 'invalid'
+    if bits > CODE_BITS_MAX:
+        raise InputError(f"signal '{s.name}': {s.low:g} .. {s.high:g} in steps of {s.resolution:g} needs {bits} bits, at most {CODE_BITS_MAX} fit; make the resolution coarser")
+    length = 32 if s.float32 else (bits + 7) // 8 * 8
+    largest = max(abs(s.low), abs(s.high), abs(offset))
+    rounding = 12 * U32 * largest  # encoder, decoder and the reading itself, in float32
+    return SignalTable(
+        name=s.name,
+        resolution=resolution,
+        offset=offset,
+        per_unit=float(nearest32(np.array(1.0 / resolution))),
+        minimum=minimum,
+        maximum=maximum,
+        start=start,
+        length=length,
+        flags=FLOAT32 if s.float32 else SIGNED,
+        half=float(up32(np.array(rounding if exact else resolution / 2 + rounding))),
+        span=float(up32(np.array((s.high - s.low) * (1 + 4 * U32) + resolution))),
+        middle=float(nearest32(np.array((s.low + s.high) / 2))),
+        zero=round(-offset / resolution),
+    )
+
+
+def message_table(name: str, frame: Frame, length: int) -> MessageTable:
+    """hg_message; the frame's length is rounded up to one that the format can carry."""
+    if frame.fd:
+        length = next(n for n in (8, 12, 16, 20, 24, 32, 99) if n >= length)
+    if length > (32 if frame.fd else 8):
+        cure = "split the group" if frame.fd else "make the frame fd = true, or split the group"
+        raise InputError(f"group '{name}': its signals need {length} bytes with protection, more than {32 if frame.fd else 8}; {cure}")
+    flags = (EXTENDED if frame.extended else 0) | ((FD | BRS) if frame.fd else 0)
+    return MessageTable(name, frame.id, flags, length, data_ids(frame.data_id))
+
+
+def group_table(model: Model, group: Group, slew: Array) -> GroupTable:
+    """Trigger in codes, hold in signal units. `slew` (signals x horizon) is of the model's whole signal vector."""
+    trigger = group.trigger
+    signals, start = [], HEADER_BITS
+    for i in group.signals:
+        s = signal_table(model.signals[i], start, group.applied_as_sent)
+        signals.append(s)
+        start += s.length
+    resolution = np.array([s.resolution for s in signals])
+    half = np.array([s.half for s in signals])
+    horizon = trigger.interval_max + trigger.margin
+    # Radius (threshold + 1/2) resolution must not exceed the trigger that was asked for.
+    sigma = np.maximum(np.floor(trigger.sigma / resolution - 0.5 + 1e-6), 0.0)
+    widest = np.array([s.span for s in signals])
+    table = np.minimum(slew[list(group.signals), :horizon].T + half, widest)
+    message = message_table(group.name, group.frame, start // 8)
+    shortest = min(trigger.silence) + 1
+    if 16 * shortest <= horizon:
+        raise InputError(
+            f"group '{group.name}': its counter of 16 hides the loss of 16 frames, which can pass within interval_max + margin = {horizon} samples; "
+            f"shorten them to {16 * shortest - 1}, or make the sender silent for longer"
+        )
+    return GroupTable(
+        name=group.name,
+        first=group.signals[0] if group.signals else 0,
+        signals=tuple(signals),
+        message=message,
+        levels=len(trigger.silence),
+        interval_max=trigger.interval_max,
+        margin=trigger.margin,
+        silence=trigger.silence,
+        delta=tuple(tuple(math.floor(x * 65536) for x in r) for r in trigger.delta),
+        sigma=tuple(tuple(int(x) for x in r) for r in sigma),
+        activity=tuple(tuple(math.ceil(x - 1e-9) for x in r) for r in trigger.activity / resolution),
+        slew=rows(up32(table)),
+    )

@@ -1,0 +1,185 @@
+"""Plants: matrices as given, or made by a builder, always discrete in the end.
+
+x(k+1) = A x + B u + Ed d      y(k) = C x + D u + Fd d      |d_j| <= 1
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from hullguard.errors import InputError
+from hullguard.model.table import Array, Table
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """How the emulated plant is driven: u = equilibrium input - gain (x - equilibrium) + u_ref, |u_ref| <= reference_bound."""
+
+    gain: Array  # p x n
+    reference_bound: Array  # p
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A discrete linear plant with bounded disturbances."""
+
+    states: tuple[str, ...]
+    A: Array  # n x n
+    B: Array  # n x p
+    C: Array  # m x n
+    D: Array  # m x p
+    Ed: Array  # n x nd
+    Fd: Array  # m x nd
+    initial_range: Array  # n: |x(0) - equilibrium| at a start at rest
+    equilibrium: Array  # n: the state around which an emulated plant moves
+    feedback: Feedback | None
+
+    @property
+    def n(self) -> int:
+        """States."""
+        return int(self.A.shape[0])
+
+    @property
+    def m(self) -> int:
+        """Outputs."""
+        return int(self.C.shape[0])
+
+    @property
+    def p(self) -> int:
+        """Inputs."""
+        return int(self.B.shape[1])
+
+
+def zero_order_hold(A: Array, B: Array, sample_time_s: float) -> tuple[Array, Array]:
+    """Discrete A, B of a continuous plant whose input is held between samples."""
+    n, p = B.shape
+    M = scipy.linalg.expm(np.block([[A, B], [np.zeros((p, n + p))]]) * sample_time_s)
+    return M[:n, :n], M[:n, n:]
+
+
+def string_of_vehicles(table: Table) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+    """A single-lane string (Levine and Athans 1966): speed deviations w_i and gap deviations g_(i,i+1); platoon, section 1.
+
+    dw_i/dt = -drag w_i + u_i      dg_(i,i+1)/dt = w_i - w_(i+1)
+    """
+    vehicles = table.whole("vehicles", 2, 20)
+    drag = table.number("drag_per_s", 0.0)
+    n = 2 * vehicles - 1
+    A, B = np.zeros((n, n)), np.zeros((n, vehicles))
+    states: list[str] = []
+    for i in range(vehicles):
+        A[2 * i, 2 * i], B[2 * i, i] = -drag, 1.0
+        states.append(f"speed{i + 1}_mps")
+        if i + 1 < vehicles:
+            A[2 * i + 1, 2 * i], A[2 * i + 1, 2 * i + 2] = 1.0, -1.0
+            states.append(f"gap{i + 1}{i + 2}_m")
+    return tuple(states), tuple(f"control{i + 1}_mps2" for i in range(vehicles)), A, B
+
+
+def car_following(table: Table) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+    """Cars behind one another whose accelerations are measured: dv_i/dt = a_i, dg_i/dt = v_(i-1) - v_i; platoon, section 9."""
+    cars = table.whole("cars", 2, 20)
+    n = 2 * cars - 1
+    A, B = np.zeros((n, n)), np.zeros((n, cars))
+    states = ["speed1_mps"]
+    B[0, 0] = 1.0
+    for i in range(2, cars + 1):
+        speed, gap, ahead = 2 * i - 3, 2 * i - 2, max(2 * i - 5, 0)
+        states += [f"speed{i}_mps", f"gap{i}_m"]
+        B[speed, i - 1] = 1.0
+        A[gap, ahead], A[gap, speed] = 1.0, -1.0
+    return tuple(states), tuple(f"accel{i}_mps2" for i in range(1, cars + 1)), A, B
+
+
+BUILDERS = {"string_of_vehicles": string_of_vehicles, "car_following": car_following}
+
+
+def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[str, float], sample_time_s: float) -> Plant:
+    """Read the [plant] table. `outputs` and `inputs` are signal names in the model's order; `noise` bounds sensor noise by signal."""
+    if "builder" in table:
+        name = table.text("builder", choices=sorted(BUILDERS))
+        states, names, A, B = BUILDERS[name](table)
+        for signal in outputs:
+            if signal not in states:
+                raise InputError(f"signal '{signal}': the builder {name} has no such state; it has {', '.join(states)}")
+        if list(names) != inputs:
+            raise InputError(f"inputs are {', '.join(inputs) or 'none'}: the builder {name} needs, in this order, {', '.join(names)}")
+        A, B = zero_order_hold(A, B, sample_time_s)
+        C = np.eye(len(states))[[states.index(s) for s in outputs]]
+        D = np.zeros((len(outputs), len(inputs)))
+    else:
+        A = table.matrix("A")
+        n = A.shape[0]
+        if A.shape != (n, n):
+            raise table.error("A", f"expected a square matrix, found {A.shape[0]} x {A.shape[1]}")
+        B = table.matrix("B", n, len(inputs)) if inputs else np.zeros((n, 0))
+        C = table.matrix("C", len(outputs), n)
+        D = table.matrix("D", len(outputs), len(inputs)) if "D" in table else np.zeros((len(outputs), len(inputs)))
+        states = tuple(table.names("states", [f"x{i + 1}" for i in range(n)]))
+        if len(states) != n:
+            raise table.error("states", f"expected {n} names, found {len(states)}")
+        if not table.flag("discrete", False):
+            A, B = zero_order_hold(A, B, sample_time_s)
+    n = A.shape[0]
+    Ed, Fd = _disturbance(table, B, outputs, inputs, noise)
+    plant = Plant(
+        states=states,
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        Ed=Ed,
+        Fd=Fd,
+        initial_range=table.vector("initial_range", n, 0.0),
+        equilibrium=table.vector("equilibrium", n) if "equilibrium" in table else np.zeros(n),
+        feedback=_feedback(table, A, B) if "feedback" in table else None,
+    )
+    table.close()
+    return plant
+
+
+def _disturbance(table: Table, B: Array, outputs: list[str], inputs: list[str], noise: dict[str, float]) -> tuple[Array, Array]:
+    """Ed, Fd from the disturbance table and from the sensors' noise; measured inputs pass their noise on through B."""
+    n, m = B.shape[0], len(outputs)
+    bounds = table.table("disturbance", optional=True)
+    state = _bound(bounds, "state", n)
+    output = _bound(bounds, "output", m)
+    bounds.close()
+    on_output = np.diag([noise.get(s, 0.0) for s in outputs])
+    on_input = B @ np.diag([noise.get(s, 0.0) for s in inputs]) if inputs else np.zeros((n, 0))
+    Ed = np.hstack([state, np.zeros((n, output.shape[1])), np.zeros((n, m)), on_input])
+    Fd = np.hstack([np.zeros((m, state.shape[1])), output, on_output, np.zeros((m, on_input.shape[1]))])
+    used = np.any(Ed, axis=0) | np.any(Fd, axis=0)
+    return Ed[:, used], Fd[:, used]
+
+
+def _bound(table: Table, key: str, rows: int) -> Array:
+    if key not in table:
+        return np.zeros((rows, 0))
+    value = table.raw(key)
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return table.matrix(key, rows)
+    return np.diag(table.vector(key, rows, 0.0))
+
+
+def _feedback(table: Table, A: Array, B: Array) -> Feedback:
+    """Either a gain matrix, or the weights of a discrete linear-quadratic regulator."""
+    inner = table.table("feedback")
+    n, p = B.shape
+    if "gain" in inner:
+        gain = inner.matrix("gain", p, n)
+    else:
+        Q = np.diag(inner.vector("state_weights", n, 0.0))
+        R = np.diag(inner.vector("input_weights", p, 1e-12))
+        try:
+            # The tiny weight lets the solver find the stabilising solution when a stable mode carries no weight.
+            P = scipy.linalg.solve_discrete_are(A, B, Q + 1e-9 * np.eye(n), R)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            raise inner.error("state_weights", f"no stabilising regulator ({error}); give 'gain' instead") from error
+        gain = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+    feedback = Feedback(gain, inner.vector("reference_bound", p, 0.0))
+    inner.close()
+    return feedback

@@ -1,0 +1,541 @@
+"""The model file, schema 1: what an engineer writes, checked and in the units it was written in."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hullguard.errors import InputError
+from hullguard.model.faults import FaultSpec, parse_fault
+from hullguard.model.plant import Plant, read_plant
+from hullguard.model.table import Array, Table
+
+SCHEMA = 1
+NAME = re.compile(r"^[a-z][a-z0-9_]{0,30}$")
+SHIPPED = Path(__file__).resolve().parent.parent.parent / "models"
+GROUPS_MAX = 8
+FAULTS_MAX = 16
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One signal on the bus, output or input of the plant."""
+
+    name: str
+    role: str  # output | input
+    low: float
+    high: float
+    resolution: float
+    slew: tuple[float, ...] | None  # None: computed from reachable sets
+    scale: float  # activity scale of the adaptive trigger
+    noise: float  # bound of the sensor's noise
+    csv_delay: int  # the reading at k is the recording's row k - csv_delay
+    float32: bool
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where a message sits on the bus."""
+
+    id: int
+    extended: bool
+    fd: bool
+    data_id: int
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """The sender's promise, in physical units, a row a level; level 0 is the quietest."""
+
+    delta: Array  # levels x width
+    sigma: Array  # levels x width
+    silence: tuple[int, ...]
+    interval_max: int
+    activity: Array  # levels x width: change between frames that reaches the level; row 0 is not used
+    margin: int
+
+
+@dataclass(frozen=True)
+class Group:
+    """One sender: one trigger, one frame."""
+
+    name: str
+    signals: tuple[int, ...]  # places in the model's signal vector, consecutive
+    frame: Frame
+    trigger: Trigger
+    closing: bool
+    applied_as_sent: bool
+
+
+@dataclass(frozen=True)
+class Search:
+    """How the free parameters of a generator are looked for."""
+
+    trials: int
+    seed: int
+    poles: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Observer:
+    """One residual generator that the design has to find."""
+
+    order: int
+    residuals: int
+    outputs: tuple[int, ...]  # indices into y
+    inputs: tuple[int, ...]  # indices into u
+    faults: tuple[int, ...]  # indices into the model's faults: what it is searched for
+    aware: bool  # trigger-aware post-filter
+    search: Search
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that must be found, and can be injected by name."""
+
+    name: str
+    signal: int
+    type: str  # actuator | sensor
+
+
+@dataclass(frozen=True)
+class Reference:
+    """How an emulated plant is driven."""
+
+    kind: str  # rest | steps | ramps | sines | mixed
+    amplitude: float
+    period: int  # samples
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A named run."""
+
+    name: str
+    samples: int
+    reference: Reference
+    faults: tuple[FaultSpec, ...]
+    set: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A whole model. The signal vector is the groups' signals, group after group."""
+
+    name: str
+    path: Path
+    sample_time_s: float
+    bitrate_bps: int
+    load_max: float
+    plant: Plant
+    signals: tuple[Signal, ...]
+    groups: tuple[Group, ...]
+    observers: tuple[Observer, ...]
+    verdict: Frame
+    status: Frame
+    heartbeat: int
+    debounce_up: int
+    debounce_down: int
+    latch: bool
+    faults: tuple[Fault, ...]
+    scenarios: tuple[Scenario, ...]
+    sha256: str  # of everything that a design depends on
+
+    @property
+    def outputs(self) -> list[int]:
+        """Places of the plant's outputs y in the signal vector."""
+        return [i for i, s in enumerate(self.signals) if s.role == "output"]
+
+    @property
+    def inputs(self) -> list[int]:
+        """Places of the plant's inputs u in the signal vector."""
+        return [i for i, s in enumerate(self.signals) if s.role == "input"]
+
+    @property
+    def closing(self) -> int:
+        """Index of the group whose frame closes the sample."""
+        return next(i for i, g in enumerate(self.groups) if g.closing)
+
+    def signal(self, name: str) -> int:
+        """Place of a signal in the vector, by its name or by the name of a fault."""
+        for i, s in enumerate(self.signals):
+            if s.name == name:
+                return i
+        for fault in self.faults:
+            if fault.name == name:
+                return fault.signal
+        known = ", ".join([s.name for s in self.signals] + [f.name for f in self.faults])
+        raise InputError(f"'{name}' is neither a signal nor a fault of model {self.name}: {known}")
+
+    def scenario(self, name: str | None) -> Scenario:
+        """A scenario by name; the first one without a name."""
+        if name is None:
+            return self.scenarios[0]
+        for s in self.scenarios:
+            if s.name == name:
+                return s
+        raise InputError(f"model {self.name} has no scenario '{name}': {', '.join(s.name for s in self.scenarios)}")
+
+
+def find_model(name: str) -> Path:
+    """The file behind a shipped model's name, or behind a path."""
+    path = Path(name)
+    if path.suffix == ".toml" or path.exists():
+        if not path.is_file():
+            raise InputError(f"model '{name}': no such file")
+        return path
+    shipped = SHIPPED / f"{name}.toml"
+    if not shipped.is_file():
+        known = sorted(p.stem for p in SHIPPED.glob("*.toml") if not p.stem.endswith(".design"))
+        raise InputError(f"model '{name}': neither a file nor a shipped model ({', '.join(known)})")
+    return shipped
+
+
+def load_model(name: str, overrides: dict[str, Any] | None = None, scenario: str | None = None) -> Model:
+    """Read a model by shipped name or path; then what the scenario sets, then `overrides` (dotted keys, as --set gives them)."""
+    path = find_model(name)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path.name}: not valid TOML: {error}") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    model = parse_model(data, path)
+    changes = dict(model.scenario(scenario).set) | (overrides or {})
+    for key, value in changes.items():
+        _override(data, key, value)
+    return parse_model(data, path) if changes else model
+
+
+def _override(data: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key; a list of named tables is entered by name or number, as in groups.measurement.trigger.silence."""
+    *parents, last = key.split(".")
+    place: Any = data
+    for part in parents:
+        if isinstance(place, list):
+            hits = [e for i, e in enumerate(place) if isinstance(e, dict) and (e.get("name") == part or str(i) == part)]
+            if not hits:
+                raise InputError(f"--set {key}: no entry '{part}'")
+            place = hits[0]
+        elif isinstance(place, dict):
+            place = place.setdefault(part, {})
+        else:
+            raise InputError(f"--set {key}: '{part}' is not a table")
+    if not isinstance(place, dict):
+        raise InputError(f"--set {key}: '{last}' has no table around it")
+    place[last] = value
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """KEY=VALUE with VALUE in TOML; a bare word is text."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"--set '{text}': expected KEY=VALUE, for example groups.measurement.trigger.silence=1")
+    try:
+        parsed = tomllib.loads(f"v = {value}")["v"]
+    except tomllib.TOMLDecodeError:
+        parsed = value.strip()
+    return key.strip(), parsed
+
+
+def parse_model(source: dict[str, Any], path: Path) -> Model:
+    """Check a model's data and make a Model of it."""
+    data = copy.deepcopy(source)
+    top = Table(data, path.name)
+    if top.whole("schema", 1, 10_000) != SCHEMA:
+        raise top.error("schema", f"this version reads schema {SCHEMA}")
+    name = top.text("name")
+    if not NAME.match(name):
+        raise top.error("name", f"'{name}' is not a lower-case identifier of at most 31 characters")
+    top.text("kind", choices=["linear"])
+    sample_time_s = top.number("sample_time_s", 1e-6, 3600.0)
+    bus = top.table("bus", optional=True)
+    bitrate = bus.whole("bitrate_bps", 10_000, 8_000_000, 500_000)
+    load_max = bus.number("load_max", 0.01, 1.0, 0.7)
+    bus.close()
+
+    declared = [_read_signal(t) for t in top.tables("signals")]
+    _unique([s.name for s in declared], f"{path.name}: signals")
+    groups, order = _read_groups(top, declared, path)
+    signals = tuple(declared[i] for i in order)
+    outputs = [s.name for s in signals if s.role == "output"]
+    inputs = [s.name for s in signals if s.role == "input"]
+    if not outputs:
+        raise InputError(f"{path.name}: no signal has role = \"output\": there is nothing to check")
+    noise = {s.name: s.noise for s in signals}
+    plant = read_plant(top.table("plant"), outputs, inputs, noise, sample_time_s)
+    faults = tuple(_read_fault(t, signals) for t in top.tables("faults", optional=True))
+    _unique([f.name for f in faults] + [s.name for s in signals], f"{path.name}: faults and signals")
+    if len(faults) > FAULTS_MAX:
+        raise InputError(f"{path.name}: {len(faults)} faults, the verdict frame has room for {FAULTS_MAX}")
+    observers = _read_observers(top.table("detector"), outputs, inputs, faults)
+    verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
+    scenarios = _read_scenarios(top, path)
+    top.close()
+    if sum(g.closing for g in groups) != 1:
+        raise InputError(f"{path.name}: exactly one group closes the sample with transmission = \"tick\"; found {sum(g.closing for g in groups)}")
+    return Model(
+        name=name,
+        path=path,
+        sample_time_s=sample_time_s,
+        bitrate_bps=bitrate,
+        load_max=load_max,
+        plant=plant,
+        signals=signals,
+        groups=groups,
+        observers=observers,
+        verdict=verdict,
+        status=status,
+        heartbeat=heartbeat,
+        debounce_up=up,
+        debounce_down=down,
+        latch=latch,
+        faults=faults,
+        scenarios=scenarios,
+        sha256=_fingerprint(source),
+    )
+
+
+def _fingerprint(data: dict[str, Any]) -> str:
+    """SHA-256 of all that a design depends on; scenarios and faults' sizes are not among it."""
+    relevant = {k: v for k, v in data.items() if k != "scenarios"}
+    return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
+
+
+def _unique(names: list[str], where: str) -> None:
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise InputError(f"{where}: '{twice[0]}' is there twice")
+
+
+def _read_signal(t: Table) -> Signal:
+    name = t.text("name")
+    if not NAME.match(name):
+        raise t.error("name", f"'{name}' is not a lower-case identifier of at most 31 characters")
+    low, high = (float(v) for v in t.vector("range", 2))
+    if not low < high:
+        raise t.error("range", f"{low:g} is not below {high:g}")
+    resolution = t.number("resolution", 1e-12, high - low)
+    slew: tuple[float, ...] | None = None
+    if "slew" in t and t.raw("slew") != "reachable":
+        if isinstance(t.raw("slew"), str):
+            raise t.error("slew", "expected a list of numbers or \"reachable\"")
+        slew = tuple(float(v) for v in t.vector("slew", low=0.0))
+        if not slew or any(b < a for a, b in zip(slew, slew[1:], strict=False)):
+            raise t.error("slew", "expected at least one number, none smaller than the one before")
+    recording = t.table("recording", optional=True)
+    delay = recording.whole("delay", 0, 100, 0)
+    recording.close()
+    signal = Signal(
+        name=name,
+        role=t.text("role", choices=["output", "input"]),
+        low=low,
+        high=high,
+        resolution=resolution,
+        slew=slew,
+        scale=t.number("scale", 1e-12, default=1.0),
+        noise=t.number("noise", 0.0, default=0.0),
+        csv_delay=delay,
+        float32=t.text("wire", "integer", ["integer", "float32"]) == "float32",
+    )
+    t.close()
+    return signal
+
+
+def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[Group, ...], list[int]]:
+    """The groups, and the declared signals in the order in which the groups send them."""
+    names = [s.name for s in declared]
+    groups: list[Group] = []
+    order: list[int] = []
+    for t in top.tables("groups"):
+        members = t.names("signals", [])
+        for member in members:
+            if member not in names:
+                raise t.error("signals", f"'{member}' is not a declared signal")
+        places = [names.index(m) for m in members]
+        first = len(order)
+        order += places
+        groups.append(_read_group(t, tuple(range(first, len(order))), [declared[i] for i in places]))
+    if not 1 <= len(groups) <= GROUPS_MAX:
+        raise InputError(f"{path.name}: {len(groups)} groups; 1 .. {GROUPS_MAX} are possible")
+    _unique([g.name for g in groups], f"{path.name}: groups")
+    for i, n in enumerate(names):
+        if order.count(i) != 1:
+            raise InputError(f"{path.name}: signal '{n}' is in {order.count(i)} groups, it must be in exactly one")
+    ids = [(g.frame.id, g.frame.extended) for g in groups]
+    for g, key in zip(groups, ids, strict=True):
+        if ids.count(key) > 1:
+            raise InputError(f"{path.name}: two groups send with identifier 0x{g.frame.id:X}; give each its own")
+    closing = [g for g in groups if g.closing]
+    for g in groups:
+        if closing and not g.closing and g.frame.id > closing[0].frame.id:
+            raise InputError(
+                f"{path.name}: group '{g.name}' (0x{g.frame.id:X}) would arrive after the closing frame (0x{closing[0].frame.id:X}): "
+                "give the closing frame the larger identifier"
+            )
+    return tuple(groups), order
+
+
+def read_frame(t: Table, data_id: int) -> Frame:
+    """A message's place on the bus; the protection is profile 22."""
+    extended = t.flag("extended", False)
+    t.text("protection", "P22", ["P22"])
+    frame = Frame(t.whole("id", 0, 0x1FFFFFFF if extended else 0x7FF), extended, t.flag("fd", False), t.whole("data_id", 0, 0xFFFF, data_id))
+    t.close()
+    return frame
+
+
+def _read_group(t: Table, places: tuple[int, ...], members: list[Signal]) -> Group:
+    transmission = t.text("transmission", "event", ["event", "tick", "periodic"])
+    inner = t.table("frame")
+    frame = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+    applied = t.flag("applied_as_sent", False)
+    if applied and any(s.role != "input" for s in members):
+        raise t.error("applied_as_sent", "only inputs can be applied as sent")
+    width = len(places)
+    if transmission == "event":
+        trigger = _read_trigger(t.table("trigger"), members)
+    else:
+        margin = t.whole("margin", 0, 64, 4)
+        empty = np.zeros((1, width))
+        trigger = Trigger(empty, empty, (0,), 1, empty, margin)
+    group = Group(t.text("name"), places, frame, trigger, transmission == "tick", applied)
+    t.close()
+    return group
+
+
+def _read_trigger(t: Table, members: list[Signal]) -> Trigger:
+    """From quiet (level 0: widest threshold, longest silence) to active (last level: narrowest, shortest), in even steps."""
+    levels = t.whole("levels", 1, 8, 1)
+    width = len(members)
+    interval_max = t.whole("interval_max", 1, 200)
+    narrow, wide = _pair(t, "delta", 0.0, 0.999)
+    short, long = _pair(t, "silence", 0, interval_max - 1, default=0.0)
+    step = np.linspace(0.0, 1.0, levels) if levels > 1 else np.zeros(1)
+    sigma = t.vector("sigma", width, 0.0)
+    for s, value in zip(members, sigma, strict=True):
+        if value < s.resolution / 2:
+            raise t.error("sigma", f"{value:g} for '{s.name}' is below half its resolution of {s.resolution:g}: the trigger could not see it")
+    scales = np.array([s.scale for s in members])
+    trigger = Trigger(
+        delta=np.outer(wide + (narrow - wide) * step, np.ones(width)),
+        sigma=np.outer(np.ones(levels), sigma),
+        silence=tuple(round(v) for v in long + (short - long) * step),
+        interval_max=interval_max,
+        activity=np.outer(step, scales),
+        margin=t.whole("margin", 0, 64, 4),
+    )
+    t.close()
+    return trigger
+
+
+def _pair(t: Table, key: str, low: float, high: float, default: float | None = None) -> tuple[float, float]:
+    """A number, or [smallest, largest]."""
+    if default is not None and key not in t:
+        return default, default
+    value = t.raw(key)
+    if not isinstance(value, list):
+        one = t.number(key, low, high)
+        return one, one
+    pair = t.vector(key, 2, low)
+    if pair[0] > pair[1] or pair[1] > high:
+        raise t.error(key, f"expected [smallest, largest] within {low:g} .. {high:g}")
+    return float(pair[0]), float(pair[1])
+
+
+def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
+    name, signal = t.text("name"), t.text("signal")
+    places = [i for i, s in enumerate(signals) if s.name == signal]
+    if not places:
+        raise t.error("signal", f"'{signal}' is not a declared signal")
+    kind = t.text("type", choices=["actuator", "sensor"])
+    if kind == "actuator" and signals[places[0]].role != "input":
+        raise t.error("type", f"'{signal}' is an output: an actuator fault needs an input")
+    t.close()
+    return Fault(name, places[0], kind)
+
+
+def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...]) -> tuple[Observer, ...]:
+    t.text("threshold", "exact", ["exact"])
+    t.text("number", "f32", ["f32", "f64"])
+    observers = []
+    for o in t.tables("observers"):
+        chosen = {key: o.names(key, everything) for key, everything in (("outputs", outputs), ("inputs", inputs), ("faults", [f.name for f in faults]))}
+        for key, known in (("outputs", outputs), ("inputs", inputs), ("faults", [f.name for f in faults])):
+            for n in chosen[key]:
+                if n not in known:
+                    raise o.error(key, f"'{n}' is not one of {', '.join(known) or 'none'}")
+        s = o.table("search", optional=True)
+        poles = s.vector("poles", 2) if "poles" in s else np.array([0.0, 0.9])
+        if not -1.0 < poles[0] <= poles[1] < 1.0:
+            raise s.error("poles", "expected [smallest, largest] inside the unit circle: -1 .. 1")
+        s.text("objective", "smallest fault", ["smallest fault"])
+        search = Search(s.whole("trials", 1, 1_000_000, 1000), s.whole("seed", 0, 2**32 - 1, 1), (float(poles[0]), float(poles[1])))
+        s.close()
+        names = [f.name for f in faults]
+        observers.append(
+            Observer(
+                order=o.whole("order", 1, 40),
+                residuals=o.whole("residuals", 1, 16),
+                outputs=tuple(outputs.index(n) for n in chosen["outputs"]),
+                inputs=tuple(inputs.index(n) for n in chosen["inputs"]),
+                faults=tuple(names.index(n) for n in chosen["faults"]),
+                aware=o.flag("trigger_aware", True),
+                search=search,
+            )
+        )
+        o.close()
+    if not 1 <= len(observers) <= 32:
+        raise t.error("observers", f"{len(observers)} residual generators; 1 .. 32 are possible")
+    t.close()
+    return tuple(observers)
+
+
+def _read_verdict(t: Table, groups: tuple[Group, ...]) -> tuple[Frame, Frame, int, int, int, bool]:
+    inner = t.table("frame")
+    verdict = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+    if "status_frame" in t:
+        inner = t.table("status_frame")
+        status = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+    else:
+        status = Frame(verdict.id + 1, verdict.extended, verdict.fd, (verdict.data_id + 1) & 0xFFFF)
+    taken = [g.frame.id for g in groups] + [verdict.id, status.id]
+    for i in (verdict.id, status.id):
+        if taken.count(i) > 1:
+            raise t.error("frame", f"identifier 0x{i:X} is used twice")
+    debounce = t.table("debounce", optional=True)
+    up, down = debounce.whole("up", 1, 255, 1), debounce.whole("down", 1, 255, 5)
+    debounce.close()
+    heartbeat, latch = t.whole("heartbeat_samples", 1, 65535, 10), t.flag("latch", False)
+    t.close()
+    return verdict, status, heartbeat, up, down, latch
+
+
+def _read_scenarios(top: Table, path: Path) -> tuple[Scenario, ...]:
+    scenarios = []
+    for t in top.tables("scenarios", optional=True):
+        r = t.table("reference", optional=True)
+        seconds = r.number("period_s", 1e-6, default=6.0)
+        reference = Reference(
+            r.text("kind", "rest", ["rest", "steps", "ramps", "sines", "mixed"]),
+            r.number("amplitude", 0.0, default=1.0),
+            max(1, round(seconds / float(top.number("sample_time_s")))),
+        )
+        r.close()
+        overrides = t.raw("set") if "set" in t else {}
+        if not isinstance(overrides, dict):
+            raise t.error("set", "expected a table of KEY = VALUE")
+        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides))
+        t.close()
+    if not scenarios:
+        scenarios.append(Scenario("default", 200, Reference("rest", 0.0, 1), ()))
+    _unique([s.name for s in scenarios], f"{path.name}: scenarios")
+    return tuple(scenarios)

@@ -1,0 +1,1498 @@
+/** @file
+ *  Holds the library against the oracle on random problems. Built twice, for float32 and float64. HULLGUARD_SEED repeats a run. */
+#include "oracle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <random>
+#include <setjmp.h>
+#include <string>
+#include <vector>
+
+extern "C" {
+#include <cmocka.h>
+
+#include "hullguard/decision.h"
+#include "hullguard/detector.h"
+#include "hullguard/hold.h"
+#include "hullguard/hull.h"
+#include "hullguard/residual.h"
+#include "hullguard/trigger.h"
+}
+
+namespace {
+
+using oracle::Matrix;
+using oracle::Vector;
+using std::size_t;
+using Reals = std::vector<hg_real>;
+
+constexpr double unit = static_cast<double>(std::numeric_limits<hg_real>::epsilon()); /* two units of rounding of the library's number */
+constexpr double unit_double = std::numeric_limits<double>::epsilon();
+constexpr int    problems = 1000;
+
+/* ---- Small tools ---- */
+
+class Random {
+public:
+    explicit Random(std::uint64_t seed) : engine_(seed) {}
+    double real(double low, double high) { return low + (high - low) * std::ldexp(static_cast<double>(engine_() >> 11), -53); }
+    int    whole(int low, int high) { return static_cast<int>(integer(low, high)); }
+    bool   chance(double p) { return real(0.0, 1.0) < p; }
+    std::int64_t integer(std::int64_t low, std::int64_t high)
+    {
+        return low + static_cast<std::int64_t>(engine_() % static_cast<std::uint64_t>(high - low + 1));
+    }
+    Matrix matrix(Eigen::Index rows, Eigen::Index cols)
+    {
+        return Matrix::NullaryExpr(rows, cols, [this]() { return real(-1.0, 1.0); });
+    }
+
+private:
+    std::mt19937_64 engine_;
+};
+
+std::uint64_t the_seed = 0;
+
+/* One stream a test, so that a test repeats alone. */
+Random stream(std::uint64_t test) { return Random(the_seed * 1000003U + test); }
+
+std::string say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+std::string say(const char *format, ...)
+{
+    char    text[600];
+    va_list list;
+    va_start(list, format);
+    std::vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    return text;
+}
+
+/* Only here may cmocka jump out: nothing with a destructor is alive above the caller's result. */
+void expect_clean(const std::string &failure)
+{
+    if (!failure.empty()) {
+        fail_msg("HULLGUARD_SEED=%llu: %s", static_cast<unsigned long long>(the_seed), failure.c_str());
+    }
+}
+
+hg_real nearest(double x) { return static_cast<hg_real>(x); }
+
+hg_real round_up(double x)
+{
+    const hg_real y = nearest(x);
+    return (static_cast<double>(y) < x) ? std::nextafter(y, std::numeric_limits<hg_real>::infinity()) : y;
+}
+
+Reals row_major(const Matrix &m)
+{
+    Reals out;
+    for (Eigen::Index i = 0; i < m.rows(); ++i) {
+        for (Eigen::Index j = 0; j < m.cols(); ++j) {
+            out.push_back(nearest(m(i, j)));
+        }
+    }
+    return out;
+}
+
+double spectral_radius(const Matrix &m)
+{
+    return m.rows() == 0 ? 0.0 : m.eigenvalues().cwiseAbs().maxCoeff();
+}
+
+Matrix beside(const Matrix &a, const Matrix &b)
+{
+    Matrix out(a.rows(), a.cols() + b.cols());
+    out << a, b;
+    return out;
+}
+
+/* ---- Random generators ---- */
+
+/* Real, complex, repeated and defective eigenvalues within the radius, seen from a random basis. */
+Matrix random_stable(Random &random, Eigen::Index n, double radius)
+{
+    Matrix       m = Matrix::Zero(n, n);
+    Eigen::Index i = 0;
+    while (i < n) {
+        const double       rho  = random.real(0.0, radius);
+        const double       turn = random.real(0.1, 3.0);
+        const bool         pair = random.chance(0.4) && n - i >= 2;
+        const Eigen::Index most = (n - i) / (pair ? 2 : 1);
+        const Eigen::Index size = random.chance(0.5) ? 1 : std::min<Eigen::Index>(most, random.whole(2, 3)); /* of the Jordan block */
+        for (Eigen::Index b = 0; b < size; ++b) {
+            if (pair) {
+                m.block(i, i, 2, 2) << rho * std::cos(turn), rho * std::sin(turn), -rho * std::sin(turn), rho * std::cos(turn);
+                if (b > 0) { m.block(i - 2, i, 2, 2) = Matrix::Identity(2, 2); }
+            } else {
+                m(i, i) = random.chance(0.5) ? rho : (size > 1 ? rho : -rho);
+                if (b > 0) { m(i - 1, i) = 1.0; m(i, i) = m(i - 1, i - 1); }
+            }
+            i += pair ? 2 : 1;
+        }
+    }
+    Matrix basis = random.matrix(n, n).householderQr().householderQ();
+    for (Eigen::Index c = 0; c < n; ++c) { basis.col(c) *= std::exp(random.real(-0.5, 0.5)); }
+    return basis * m * basis.inverse();
+}
+
+/* Stable observer and stable post-filter: one of the two gets the random poles, the other follows while Lo is small enough. */
+oracle::Generator random_generator(Random &random)
+{
+    const int         s = random.whole(1, 8), r = random.whole(1, 3), width = random.whole(1, 6);
+    const int         m = random.whole(0, width), p = width - m;
+    const Matrix      stable = random_stable(random, s, 0.9);
+    const bool        filter = random.chance(0.5);
+    oracle::Generator g{stable, random.matrix(s, p), random.matrix(s, m), random.matrix(r, s), random.matrix(r, m), random.matrix(r, p),
+                        random.matrix(s, r), random.matrix(r, r)};
+    const auto other = [&]() -> Matrix { return filter ? Matrix(stable + g.Lo * g.W) : Matrix(stable - g.Lo * g.W); };
+    while (spectral_radius(other()) > 0.95) {
+        g.Lo *= 0.5;
+    }
+    if (filter) { g.G = other(); }
+    return g;
+}
+
+/* A linear system as the library's tables describe one, with the magnitudes its coefficients were summed from. */
+struct System {
+    Matrix A, B, C, D;
+    Matrix A_abs, B_abs, C_abs, D_abs;
+};
+
+System plain(const Matrix &A, const Matrix &B, const Matrix &C, const Matrix &D)
+{
+    return {A, B, C, D, A.cwiseAbs(), B.cwiseAbs(), C.cwiseAbs(), D.cwiseAbs()};
+}
+
+/* residual.h; platoon, section 3, "Fused form" */
+System fused(const oracle::Generator &g)
+{
+    System s = plain(g.G - g.Lo * g.W, beside(g.L + g.Lo * g.V, g.H - g.Lo * g.Qu), -g.Mo * g.W, g.Mo * beside(g.V, -g.Qu));
+    const Matrix Lo = g.Lo.cwiseAbs(), Mo = g.Mo.cwiseAbs();
+    s.A_abs = g.G.cwiseAbs() + Lo * g.W.cwiseAbs();
+    s.B_abs = beside(g.L.cwiseAbs() + Lo * g.V.cwiseAbs(), g.H.cwiseAbs() + Lo * g.Qu.cwiseAbs());
+    s.C_abs = Mo * g.W.cwiseAbs();
+    s.D_abs = Mo * beside(g.V, g.Qu).cwiseAbs();
+    return s;
+}
+
+System observer(const oracle::Generator &g) { return plain(g.G, beside(g.L, g.H), -g.W, beside(g.V, -g.Qu)); }
+System filter(const oracle::Generator &g)
+{
+    System s = plain(g.G - g.Lo * g.W, g.Lo, -g.Mo * g.W, g.Mo);
+    s.A_abs = g.G.cwiseAbs() + g.Lo.cwiseAbs() * g.W.cwiseAbs();
+    s.C_abs = g.Mo.cwiseAbs() * g.W.cwiseAbs();
+    return s;
+}
+
+/* Observer and filter in series as one system of twice the order, for its rounding bound. */
+System series(const oracle::Generator &g)
+{
+    const System       o = observer(g), f = filter(g);
+    const Eigen::Index s = g.G.rows();
+    const auto stack = [s](const Matrix &oA, const Matrix &oB, const Matrix &oC, const Matrix &oD, const Matrix &fA, const Matrix &fB,
+                           const Matrix &fC, const Matrix &fD) {
+        Matrix A = Matrix::Zero(2 * s, 2 * s), B(2 * s, oB.cols());
+        A << oA, Matrix::Zero(s, s), fB * oC, fA;
+        B << oB, fB * oD;
+        return plain(A, B, beside(fD * oC, fC), fD * oD);
+    };
+    System       all = stack(o.A, o.B, o.C, o.D, f.A, f.B, f.C, f.D);
+    const System abs = stack(o.A_abs, o.B_abs, o.C_abs, o.D_abs, f.A_abs, f.B_abs, f.C_abs, f.D_abs);
+    all.A_abs = abs.A; all.B_abs = abs.B; all.C_abs = abs.C; all.D_abs = abs.D;
+    return all;
+}
+
+/* Rounding bound of a run (platoon, section 8). A row of n products, its coefficients rounded too, is wrong by at most (n + 2) units of
+ *  sum |a||x| (Higham's gamma); coefficients that are themselves sums of `inner` products add as many. One step's error e then reaches r as
+ *  sum over lags of |C A^j| e. Units are doubled (unit is epsilon, not epsilon / 2), which covers second order terms. */
+Vector rounding(const System &s, Eigen::Index inner, const Vector &state_max, const Vector &input_max, double epsilon)
+{
+    const double gamma = static_cast<double>(s.A.cols() + s.B.cols() + inner + 3) * epsilon;
+    const Vector step  = gamma * (s.A_abs * state_max + s.B_abs * input_max);
+    Vector       total = gamma * (s.C_abs * state_max + s.D_abs * input_max);
+    Matrix       response = s.C;
+    for (int j = 0; j < 3000; ++j) {
+        total += response.cwiseAbs() * step;
+        response *= s.A;
+    }
+    return total;
+}
+
+/* Tables of a residual generator in the library's number. */
+struct Residual {
+    Reals                     A, B, C, D, memory;
+    std::vector<std::uint8_t> signal;
+    hg_residual_config        config{};
+    hg_residual               self{};
+
+    Residual(const System &s, const std::vector<std::uint8_t> &places)
+        : A(row_major(s.A)), B(row_major(s.B)), C(row_major(s.C)), D(row_major(s.D)), signal(places)
+    {
+        const auto n = static_cast<std::uint8_t>(s.A.rows()), r = static_cast<std::uint8_t>(s.C.rows());
+        const auto w = static_cast<std::uint8_t>(s.B.cols());
+        config = {n, r, w, signal.data(), {n, n, 0, A.data()}, {n, w, 0, B.data()}, {r, n, 0, C.data()}, {r, w, 0, D.data()}};
+        memory.resize(HG_RESIDUAL_REALS(n, w));
+    }
+    Residual(const Residual &) = delete;
+    Residual &operator=(const Residual &) = delete;
+    bool start() { return hg_residual_start(&self, &config, memory.data()) == HG_OK; }
+};
+
+std::vector<std::uint8_t> identity_places(Eigen::Index n)
+{
+    std::vector<std::uint8_t> places(static_cast<size_t>(n));
+    std::iota(places.begin(), places.end(), static_cast<std::uint8_t>(0));
+    return places;
+}
+
+/* Distinct places of `width` signals in a vector of `of`. */
+std::vector<std::uint8_t> random_places(Random &random, Eigen::Index width, Eigen::Index of)
+{
+    std::vector<std::uint8_t> places = identity_places(of);
+    for (size_t i = places.size() - 1; i > 0; --i) {
+        std::swap(places[i], places[static_cast<size_t>(random.integer(0, static_cast<std::int64_t>(i)))]);
+    }
+    places.resize(static_cast<size_t>(width));
+    return places;
+}
+
+/* ---- a) Residual generators ---- */
+
+struct Worst {
+    double of_tolerance = 0.0; /* difference over derived tolerance */
+    double relative     = 0.0; /* difference over signal scale */
+};
+
+std::string one_residual(Random &random, Worst &worst)
+{
+    const oracle::Generator g      = random_generator(random);
+    const Eigen::Index      m      = g.V.cols(), width = m + g.H.cols(), all = width + random.whole(0, 3), r = g.Mo.rows();
+    const auto              places = random_places(random, width, all);
+    const double            size   = std::pow(10.0, random.real(-3.0, 3.0));
+    const int               samples = 200;
+
+    Residual one(fused(g), places), two(observer(g), places), three(filter(g), identity_places(r));
+    if (!one.start() || !two.start() || !three.start()) { return "start refused"; }
+    hg_residual_pair pair{two.self, three.self};
+
+    oracle::Cascade     cascade(g);
+    std::vector<Vector> expected;
+    std::vector<Reals>  of_one, of_pair;
+    Vector in_max = Vector::Zero(width), z_max = Vector::Zero(g.G.rows()), both_max = Vector::Zero(2 * g.G.rows());
+    Vector both(2 * g.G.rows());
+    for (int k = 0; k < samples; ++k) {
+        Reals value(static_cast<size_t>(all));
+        for (hg_real &v : value) { v = nearest(size * random.real(-1.0, 1.0)); }
+        Vector in(width);
+        for (Eigen::Index i = 0; i < width; ++i) { in(i) = static_cast<double>(value[places[static_cast<size_t>(i)]]); }
+        in_max = in_max.cwiseMax(in.cwiseAbs());
+        both << cascade.observer(), cascade.filter();
+        both_max = both_max.cwiseMax(both.cwiseAbs());
+        z_max    = z_max.cwiseMax((cascade.observer() + cascade.filter()).cwiseAbs()); /* the fused state is their sum */
+        expected.push_back(cascade.step(in.head(m), in.tail(width - m)));
+
+        Reals a(static_cast<size_t>(r)), b0(static_cast<size_t>(r)), b(static_cast<size_t>(r));
+        if (random.chance(0.02)) { /* a number that is not finite is refused and changes nothing */
+            Reals bad = value;
+            bad[places[0]] = random.chance(0.5) ? std::numeric_limits<hg_real>::quiet_NaN() : -std::numeric_limits<hg_real>::infinity();
+            if (hg_residual_step(&one.self, bad.data(), a.data()) != HG_E_NUMERIC ||
+                hg_residual_pair_step(&pair, bad.data(), b0.data(), b.data()) != HG_E_NUMERIC) { return "a bad number was taken"; }
+        }
+        if (hg_residual_step(&one.self, value.data(), a.data()) != HG_OK) { return "step refused"; }
+        if (hg_residual_pair_step(&pair, value.data(), b0.data(), b.data()) != HG_OK) { return "pair refused"; }
+        of_one.push_back(a);
+        of_pair.push_back(b);
+    }
+    /* The oracle rounds as well: its own bound, in double, comes on top of the library's. */
+    const Vector of_oracle = rounding(series(g), r, both_max, in_max, unit_double);
+    const Vector tolerance_one  = rounding(fused(g), r, z_max, in_max, unit) + of_oracle;
+    const Vector tolerance_pair = rounding(series(g), r, both_max, in_max, unit) + of_oracle;
+    double scale = 0.0;
+    for (const Vector &e : expected) { scale = std::max(scale, e.cwiseAbs().maxCoeff()); }
+    for (size_t k = 0; k < expected.size(); ++k) {
+        for (Eigen::Index i = 0; i < r; ++i) {
+            const size_t c    = static_cast<size_t>(i);
+            const double d1   = std::abs(static_cast<double>(of_one[k][c]) - expected[k](i));
+            const double d2   = std::abs(static_cast<double>(of_pair[k][c]) - static_cast<double>(of_one[k][c]));
+            const double most = tolerance_one(i) + tolerance_pair(i);
+            worst.of_tolerance = std::max({worst.of_tolerance, d1 / tolerance_one(i), d2 / most});
+            worst.relative     = std::max({worst.relative, d1 / scale, d2 / scale});
+            if (!(d1 <= tolerance_one(i))) {
+                return say("k %zu: r%zu is %.17g, oracle %.17g, off by %g > %g", k, c, static_cast<double>(of_one[k][c]), expected[k](i), d1,
+                           tolerance_one(i));
+            }
+            if (!(d2 <= most)) { return say("k %zu: pair and fused differ by %g > %g", k, d2, most); }
+        }
+    }
+    return {};
+}
+
+/* The derived tolerance is rigorous but may be wide for a badly conditioned generator; the flat one, relative to the largest residual, is
+ *  what the number type should give: some 10^3 units for orders up to 8 and poles up to 0.95. */
+void test_residual(void **)
+{
+    Random      random = stream(1);
+    Worst       worst;
+    std::string failure;
+    for (int i = 0; i < problems && failure.empty(); ++i) {
+        failure = one_residual(random, worst);
+        if (!failure.empty()) { failure = say("generator %d: ", i) + failure; }
+    }
+    const double flat = (sizeof(hg_real) == 8) ? 1e-11 : 1e-4;
+    std::printf("residual: worst difference %.3g of its tolerance, %.3g of the largest residual\n", worst.of_tolerance, worst.relative);
+    if (failure.empty() && !(worst.relative <= flat)) { failure = say("relative difference %g > %g", worst.relative, flat); }
+    expect_clean(failure);
+}
+
+/* ---- b) The hull ---- */
+
+/* |h(lag)| <= output (row) x decay^(lag - taps) x input (column) for lag >= taps */
+struct Tail {
+    double decay = 0.0;
+    Vector output, input;
+    bool   modal = false;
+};
+
+/* platoon, section 6: h(lag) = C A^(lag-1) B, A = S Lam S^-1 */
+Tail modal_tail(const System &s, int taps)
+{
+    const Eigen::EigenSolver<Matrix> eigen(s.A);
+    const Eigen::MatrixXcd           S   = eigen.eigenvectors();
+    const Vector                     lam = eigen.eigenvalues().cwiseAbs();
+    const Vector                     power = lam.array().pow(taps - 1);
+    Tail t;
+    t.modal  = true;
+    t.decay  = lam.maxCoeff();
+    t.output = (s.C * S).cwiseAbs() * power;
+    t.input  = (S.inverse() * s.B).cwiseAbs().colwise().maxCoeff().transpose();
+    return t;
+}
+
+/* For a defective A: |A^q| = beta < 1, so |A^n| <= (max of |A^b|, b < q) beta^floor(n/q), and floor(n/q) >= (n - q + 1) / q. */
+Tail power_tail(const System &s, int taps)
+{
+    const auto norm = [](const Matrix &m) { return m.cwiseAbs().rowwise().sum().maxCoeff(); };
+    Matrix power = s.A;
+    double most = 1.0;
+    int    q = 1;
+    while (norm(power) >= 0.9) {
+        most = std::max(most, norm(power));
+        power *= s.A;
+        ++q;
+    }
+    const double beta = norm(power);
+    Matrix       first = s.C;
+    for (int j = 1; j < taps; ++j) { first *= s.A; }
+    Tail t;
+    t.decay  = std::pow(beta, 1.0 / q);
+    t.output = first.cwiseAbs().rowwise().sum() * most * std::pow(t.decay, 1 - q);
+    t.input  = s.B.cwiseAbs().colwise().maxCoeff().transpose();
+    if (beta == 0.0) { t.decay = 0.5; t.output = first.cwiseAbs().rowwise().sum() * most * std::pow(2.0, q - 1); }
+    return t;
+}
+
+Tail tail_of(const System &s, int taps)
+{
+    const Eigen::EigenSolver<Matrix> eigen(s.A);
+    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(eigen.eigenvectors());
+    const double least = svd.singularValues().minCoeff();
+    Tail t = (least > 1e-5 * svd.singularValues().maxCoeff()) ? modal_tail(s, taps) : power_tail(s, taps);
+    /* theta takes the largest of the signals (hull.h), and the hull sums them: every weight must carry the number of signals */
+    t.input *= static_cast<double>(s.B.cols());
+    return t;
+}
+
+/* Tables of a hull. Every table is widened by what the sums of the library can lose (platoon, section 8), then rounded up. */
+struct HullTables {
+    Reals                     weight, rest, moving, tail_input, tail_output;
+    std::vector<std::uint8_t> signal;
+    hg_hull_config            config{};
+
+    HullTables(const System &s, const std::vector<std::uint8_t> &places, int taps, const Matrix &rest_bias, const Matrix &moving_bias,
+               const Tail &tail, int ready_rest, int ready_moving)
+        : signal(places)
+    {
+        const double widen = 1.0 + unit * (10.0 + static_cast<double>(taps * s.B.cols()));
+        Matrix       response = s.D, lag = s.B;
+        for (int j = 0; j < taps; ++j) {
+            append(weight, response.cwiseAbs() * widen);
+            response = s.C * lag;
+            lag      = s.A * lag;
+        }
+        append(rest, rest_bias * widen);
+        append(moving, moving_bias * widen);
+        append(tail_input, tail.input.transpose() * widen);
+        append(tail_output, tail.output.transpose() * widen);
+        const auto settle = static_cast<std::uint16_t>(rest_bias.rows());
+        config = {static_cast<std::uint8_t>(s.C.rows()), static_cast<std::uint8_t>(s.B.cols()), signal.data(), static_cast<std::uint8_t>(taps),
+                  weight.data(), settle, rest.data(), moving.data(), static_cast<std::uint16_t>(ready_rest),
+                  static_cast<std::uint16_t>(ready_moving), round_up(tail.decay * (1.0 + 8.0 * unit)), tail_input.data(), tail_output.data()};
+    }
+    HullTables(const HullTables &) = delete;
+    HullTables &operator=(const HullTables &) = delete;
+
+    static void append(Reals &table, const Matrix &rows)
+    {
+        for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+            for (Eigen::Index j = 0; j < rows.cols(); ++j) { table.push_back(round_up(rows(i, j))); }
+        }
+    }
+};
+
+struct HullCount {
+    int modal = 0, power = 0, tight = 0;
+    double widest = 0.0; /* J over exact J where the tail is negligible */
+};
+
+/* Radii of one sample: bursts, long silences (a radius that grows), nothing. */
+void random_radii(Random &random, Reals &radius, std::vector<int> &mode)
+{
+    for (size_t i = 0; i < radius.size(); ++i) {
+        if (random.chance(0.05)) { mode[i] = random.whole(0, 3); }
+        const double old = static_cast<double>(radius[i]);
+        radius[i] = nearest(mode[i] == 0 ? 0.0 : mode[i] == 1 ? random.real(0.0, 1.0) : mode[i] == 2 ? std::min(50.0, old * 1.1 + 0.01) : old);
+    }
+}
+
+std::string one_hull(Random &random, HullCount &count)
+{
+    const oracle::Generator g = random_generator(random);
+    const System            s = fused(g);
+    const Eigen::Index      m = g.V.cols(), width = s.B.cols(), all = width + random.whole(0, 3), r = s.C.rows();
+    const auto              places = random_places(random, width, all);
+    const int               taps   = random.chance(0.5) ? random.whole(1, 30) : random.whole(30, 120);
+    const int               length = taps + 1 + random.whole(0, 5), settle = random.whole(1, 40);
+    const int               ready_rest = random.whole(0, 50), ready_moving = random.whole(0, 50);
+    const bool              biased = random.chance(0.7);
+    const Matrix            rest   = biased ? Matrix(random.matrix(settle, r).cwiseAbs()) : Matrix::Zero(settle, r);
+    const Matrix            moving = rest + (biased ? Matrix(random.matrix(settle, r).cwiseAbs()) : Matrix::Zero(settle, r));
+    const Tail              tail = tail_of(s, taps);
+    const HullTables        tables(s, places, taps, rest, moving, tail, ready_rest, ready_moving);
+    (tail.modal ? count.modal : count.power)++;
+
+    Reals    memory(static_cast<size_t>(all * length));
+    hg_radii ring{};
+    hg_hull  hull{};
+    hg_start how = random.chance(0.5) ? HG_START_REST : HG_START_MOVING;
+    if (hg_radii_start(&ring, static_cast<std::uint8_t>(all), static_cast<std::uint8_t>(length), memory.data()) != HG_OK ||
+        hg_hull_start(&hull, &tables.config, &ring, how) != HG_OK) { return "start refused"; }
+
+    const oracle::Plant no_plant;
+    oracle::Hull        exact(g, no_plant, Vector());
+    std::vector<Reals>  radii; /* [sample][place] */
+    std::vector<int>    mode(static_cast<size_t>(all), 1);
+    Reals               radius(static_cast<size_t>(all));
+    const double        peak = (s.D_abs.sum() + s.C_abs.sum() * s.B_abs.sum());
+    double              theta = 0.0, widest = 5.0; /* a rewritten radius is at most 5 */
+    for (int step = 0; step < 150; ++step) {
+        if (random.chance(0.005)) { /* a restart forgets everything */
+            how = random.chance(0.5) ? HG_START_REST : HG_START_MOVING;
+            hg_radii_reset(&ring);
+            hg_hull_reset(&hull, how);
+            radii.clear();
+            theta = 0.0;
+        }
+        const int k = static_cast<int>(radii.size());
+        random_radii(random, radius, mode);
+        if (random.chance(0.02)) {
+            Reals bad = radius;
+            bad[0] = random.chance(0.5) ? std::numeric_limits<hg_real>::quiet_NaN() : nearest(-1.0);
+            if (hg_radii_push(&ring, bad.data()) != HG_E_NUMERIC) { return "a bad radius was taken"; }
+        }
+        if (hg_radii_push(&ring, radius.data()) != HG_OK) { return "push refused"; }
+        radii.push_back(radius);
+        if (random.chance(0.05)) { /* the past turns out to be worse than thought */
+            const int first = random.whole(0, static_cast<int>(all) - 1), many = random.whole(1, static_cast<int>(all) - first);
+            const int reach = random.whole(1, std::min(taps, 20));
+            for (int lag = 1; lag <= reach; ++lag) {
+                Reals wide(static_cast<size_t>(many));
+                for (hg_real &w : wide) { w = nearest(random.real(0.0, 5.0)); }
+                hg_radii_rewrite(&ring, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(many), wide.data());
+                if (lag <= k) { std::copy(wide.begin(), wide.end(), radii[static_cast<size_t>(k - lag)].begin() + first); }
+            }
+            if (reach > k) { /* before the first sample all radii are 0: put that back */
+                const Reals none(static_cast<size_t>(many));
+                for (int lag = k + 1; lag <= reach; ++lag) {
+                    hg_radii_rewrite(&ring, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(many), none.data());
+                }
+            }
+            const Reals far(static_cast<size_t>(many), nearest(1e6)); /* beyond the ring: ignored */
+            hg_radii_rewrite(&ring, static_cast<std::uint8_t>(std::min(255, length + random.whole(0, 9))), static_cast<std::uint8_t>(first),
+                             static_cast<std::uint8_t>(many), far.data());
+        }
+        Reals J(static_cast<size_t>(r));
+        hg_hull_step(&hull, &ring, J.data());
+
+        std::vector<Vector> y, u;
+        for (const Reals &row : radii) {
+            Vector in(width);
+            for (Eigen::Index i = 0; i < width; ++i) { in(i) = static_cast<double>(row[places[static_cast<size_t>(i)]]); }
+            y.push_back(in.head(m));
+            u.push_back(in.tail(width - m));
+        }
+        double behind = 0.0; /* largest weighted radius that has just left the taps */
+        if (k >= taps) {
+            for (Eigen::Index i = 0; i < width; ++i) {
+                behind = std::max(behind, tail.input(i) * static_cast<double>(radii[static_cast<size_t>(k - taps)][places[static_cast<size_t>(i)]]));
+            }
+        }
+        theta = tail.decay * theta + behind;
+        const Matrix &bias = (how == HG_START_REST) ? rest : moving;
+        const Vector  low  = exact.threshold(y, u) + bias.row(std::min(k, settle - 1)).transpose();
+        /* the header's formula: taps exactly, the rest by theta */
+        const double  slack = (tail.decay < 0.999) ? 4.0 * unit * (taps * static_cast<double>(width) + 12.0 + 10.0 / (1.0 - tail.decay)) : 1.0;
+        for (const hg_real x : radius) { widest = std::max(widest, static_cast<double>(x)); }
+        const double noise = 1e-13 * peak * widest; /* the oracle's own rounding, where responses cancel to nothing */
+        for (Eigen::Index i = 0; i < r; ++i) {
+            const double j = static_cast<double>(J[static_cast<size_t>(i)]);
+            if (!(j >= low(i) - noise)) { return say("k %d taps %d: J%ld %.17g below the exact hull %.17g", k, taps, static_cast<long>(i), j, low(i)); }
+            const double high = (low(i) + tail.output(i) * theta) * (1.0 + slack) + noise;
+            if (!(j <= high)) { return say("k %d taps %d: J%ld %.17g above %.17g, exact %.17g", k, taps, static_cast<long>(i), j, high, low(i)); }
+            if (low(i) > 1e6 * noise && tail.output(i) * theta < 1e-6 * low(i)) {
+                ++count.tight;
+                count.widest = std::max(count.widest, j / low(i));
+            }
+        }
+        const int ready = (how == HG_START_REST) ? ready_rest : ready_moving;
+        if (hg_hull_ready(&hull) != (k + 1 >= ready)) { return say("k %d, ready at %d: hg_hull_ready() says %d", k, ready, hg_hull_ready(&hull)); }
+    }
+    return {};
+}
+
+void test_hull(void **)
+{
+    Random      random = stream(2);
+    HullCount   count;
+    std::string failure;
+    for (int i = 0; i < problems && failure.empty(); ++i) {
+        failure = one_hull(random, count);
+        if (!failure.empty()) { failure = say("generator %d: ", i) + failure; }
+    }
+    const double small = (sizeof(hg_real) == 8) ? 1e-5 : 2e-3; /* rounding of up to 720 taps, and the tail allowed above */
+    std::printf("hull: %d modal tails, %d power tails, %d thresholds with a negligible tail, widest %.9g x exact\n", count.modal, count.power,
+                count.tight, count.widest);
+    if (failure.empty() && (count.modal < problems / 10 || count.power < problems / 20 || count.tight < problems)) { failure = "too few cases of a kind"; }
+    if (failure.empty() && !(count.widest <= 1.0 + small)) { failure = say("%g x exact although the tail is negligible", count.widest); }
+    expect_clean(failure);
+}
+
+/* ---- Plant, observer, post-filter and threshold together ---- */
+
+/* A full-order observer in random coordinates T: T A - G T = L C, H = T B - L D, V C = W T with W = C T^-1, V = I, Qu = D
+ *  (platoon, section 2), and any post-filter that is stable. */
+struct Loop {
+    oracle::Plant     plant;
+    oracle::Generator generator;
+    Matrix            T;
+    Vector            initial;
+};
+
+void draw_observer(Random &random, Loop &l)
+{
+    const Eigen::Index n = l.plant.A.rows(), m = l.plant.C.rows();
+    l.T = random.matrix(n, n) + 2.0 * Matrix::Identity(n, n);
+    while (std::abs(l.T.determinant()) < 0.1) { l.T += Matrix::Identity(n, n); }
+    Matrix gain = random.matrix(n, m);
+    while (spectral_radius(l.plant.A - gain * l.plant.C) > 0.95) { gain *= 0.5; }
+    oracle::Generator &g = l.generator;
+    g.L  = l.T * gain;
+    g.G  = l.T * (l.plant.A - gain * l.plant.C) * l.T.inverse();
+    g.H  = l.T * l.plant.B - g.L * l.plant.D;
+    g.W  = l.plant.C * l.T.inverse();
+    g.V  = Matrix::Identity(m, m);
+    g.Qu = l.plant.D;
+    g.Lo = random.matrix(n, m);
+    g.Mo = random.matrix(m, m);
+    while (spectral_radius(g.G - g.Lo * g.W) > 0.95) { g.Lo *= 0.5; }
+}
+
+Loop random_loop(Random &random)
+{
+    const int n = random.whole(1, 6), m = random.whole(1, 3), p = random.whole(1, 2);
+    Loop l;
+    l.plant = {random_stable(random, n, 0.9), random.matrix(n, p), random.matrix(m, n), random.matrix(m, p),
+               beside(0.1 * random.matrix(n, n), Matrix::Zero(n, m)), beside(Matrix::Zero(m, n), 0.1 * random.matrix(m, m))};
+    l.initial = random.matrix(n, 1).cwiseAbs();
+    draw_observer(random, l);
+    return l;
+}
+
+/* a(k) by the other route, that of the error e = T x - z (platoon, section 5): the oracle must find the same by simulation. */
+Matrix bias_by_error(const Loop &l, int rows)
+{
+    const oracle::Generator &g  = l.generator;
+    const Matrix             F  = g.G - g.Lo * g.W;
+    const Matrix             Bd = l.T * l.plant.Ed - (g.L + g.Lo * g.V) * l.plant.Fd;
+    Matrix bias(rows, g.Mo.rows());
+    Matrix reach = g.Mo * g.W; /* Mo W F^k */
+    Vector of_d  = (g.Mo * g.V * l.plant.Fd).cwiseAbs().rowwise().sum();
+    for (int k = 0; k < rows; ++k) {
+        bias.row(k) = ((reach * l.T).cwiseAbs() * l.initial + of_d).transpose();
+        of_d += (reach * Bd).cwiseAbs().rowwise().sum();
+        reach *= F;
+    }
+    return bias;
+}
+
+/* The signs that drive residual i at sample k to its threshold: the hull is attained, so it is not only an outer bound. */
+std::string one_loop(Random &random)
+{
+    const Loop               l = random_loop(random);
+    const oracle::Generator &g = l.generator;
+    const Eigen::Index       m = g.V.cols(), p = g.H.cols(), q = l.plant.Ed.cols(), n = l.plant.A.rows();
+    const int                last = random.whole(0, 40);
+    const Eigen::Index       row  = random.whole(0, static_cast<int>(g.Mo.rows()) - 1);
+    const Matrix             F = g.G - g.Lo * g.W, Bd = l.T * l.plant.Ed - (g.L + g.Lo * g.V) * l.plant.Fd;
+    const auto sign = [](double x) { return x < 0.0 ? -1.0 : 1.0; };
+
+    std::vector<Matrix> reach{g.Mo * g.W}; /* Mo W F^j */
+    for (int j = 0; j <= last; ++j) { reach.push_back(reach.back() * F); }
+    const auto response = [&](int lag, const Matrix &direct, const Matrix &input) -> Matrix {
+        return lag == 0 ? direct : Matrix(reach[static_cast<size_t>(lag - 1)] * input);
+    };
+
+    oracle::Hull        hull(g, l.plant, l.initial);
+    oracle::Cascade     cascade(g);
+    const Matrix        bias = bias_by_error(l, last + 1);
+    std::vector<Vector> y_radius, u_radius;
+    Vector x(n), r, J, u_true;
+    for (Eigen::Index i = 0; i < n; ++i) { x(i) = l.initial(i) * sign((reach[static_cast<size_t>(last)] * l.T)(row, i)); }
+    for (int k = 0; k <= last; ++k) {
+        const Matrix of_y = response(last - k, g.Mo * g.V, -(g.L + g.Lo * g.V)), of_u = response(last - k, -g.Mo * g.Qu, -(g.H - g.Lo * g.Qu));
+        const Matrix of_d = response(last - k, g.Mo * g.V * l.plant.Fd, Bd);
+        y_radius.push_back(random.matrix(m, 1).cwiseAbs());
+        u_radius.push_back(random.matrix(p, 1).cwiseAbs());
+        Vector ey = y_radius.back(), eu = u_radius.back(), d = Vector::Ones(q);
+        for (Eigen::Index i = 0; i < m; ++i) { ey(i) *= sign(of_y(row, i)); }
+        for (Eigen::Index i = 0; i < p; ++i) { eu(i) *= sign(of_u(row, i)); }
+        for (Eigen::Index i = 0; i < q; ++i) { d(i) *= sign(of_d(row, i)); }
+        u_true = random.matrix(p, 1);
+        r = cascade.step(l.plant.C * x + l.plant.D * u_true + l.plant.Fd * d + ey, u_true + eu);
+        J = hull.threshold(y_radius, u_radius);
+        x = l.plant.A * x + l.plant.B * u_true + l.plant.Ed * d;
+        if (!((r.cwiseAbs() - J).maxCoeff() <= 1e-9 * J.maxCoeff())) { return say("k %d: a fault-free residual above its threshold", k); }
+        const std::vector<Vector> none_y(static_cast<size_t>(k + 1), Vector::Zero(m)), none_u(static_cast<size_t>(k + 1), Vector::Zero(p));
+        const double              off = (hull.threshold(none_y, none_u).transpose() - bias.row(k)).cwiseAbs().maxCoeff();
+        if (!(off <= 1e-9 * (1.0 + bias.row(k).maxCoeff()))) { return say("k %d: bias by simulation and by error differ by %g", k, off); }
+    }
+    if (!(std::abs(std::abs(r(row)) - J(row)) <= 1e-9 * J(row))) { return say("worst case %.12g, threshold %.12g", r(row), J(row)); }
+    return {};
+}
+
+void test_oracle_itself(void **)
+{
+    Random      random = stream(3);
+    std::string failure;
+    for (int i = 0; i < problems / 2 && failure.empty(); ++i) {
+        failure = one_loop(random);
+        if (!failure.empty()) { failure = say("loop %d: ", i) + failure; }
+    }
+    expect_clean(failure);
+}
+
+/* ---- c) Trigger and hold ---- */
+
+/* A group in both shapes: the oracle's, and the library's tables. */
+struct Group {
+    oracle::Receiver           model; /* its numbers are those of the tables, exactly */
+    std::vector<std::uint8_t>  silence;
+    std::vector<std::uint16_t> delta;
+    std::vector<std::int32_t>  sigma, activity, zero;
+    std::vector<hg_code_scale> scale;
+    Reals                      half, slew, span, middle;
+    std::vector<double>        step; /* largest change of the walk in a sample */
+    hg_trigger_config          trigger{};
+    hg_hold_config             hold{};
+
+    Group(Random &random, bool extreme);
+    Group(Random &random, const oracle::Table &course); /* [sample][channel]: what the signals will do, so that the slew holds */
+    Group(const Group &) = delete;
+    Group &operator=(const Group &) = delete;
+    size_t width() const { return zero.size(); }
+
+private:
+    void draw_trigger(Random &random, int width, bool extreme);
+    void draw_signals(Random &random, bool extreme);
+    void add_scale(double resolution, double offset, std::int64_t low, std::int64_t high);
+    void measure_signals(Random &random, const oracle::Table &course);
+    void draw_activity(Random &random, bool extreme);
+    void connect();
+};
+
+void Group::draw_trigger(Random &random, int width, bool extreme)
+{
+    oracle::Trigger &t = model.trigger;
+    const int levels = random.whole(1, 8);
+    t.interval_max = random.chance(0.1) ? 1 : random.whole(2, 30);
+    int least = 255;
+    for (int l = 0; l < levels; ++l) {
+        t.silence.push_back(random.chance(0.3) ? 0 : random.whole(0, t.interval_max - 1));
+        least = std::min(least, t.silence.back());
+    }
+    /* a counter of 16 hides 16 frames: the design refuses unless 16 (h_min + 1) > interval_max + margin (platoon, section 4) */
+    t.interval_max = std::min(t.interval_max, 16 * (least + 1) - 1);
+    for (int &h : t.silence) { h = std::min(h, t.interval_max - 1); }
+    least = *std::min_element(t.silence.begin(), t.silence.end());
+    t.interval_max = std::min(t.interval_max, 16 * (least + 1) - 1);
+    model.margin   = random.whole(0, std::min(6, 16 * (least + 1) - 1 - t.interval_max));
+    for (int l = 0; l < levels; ++l) {
+        std::vector<double> d, s;
+        for (int g = 0; g < width; ++g) {
+            d.push_back(random.chance(0.3) ? 0 : random.chance(0.7) ? random.whole(0, 6000) : random.whole(0, 65535));
+            s.push_back(random.chance(0.2) ? 0 : (extreme && random.chance(0.5)) ? static_cast<double>(random.integer(0, INT32_MAX)) : random.whole(0, 200));
+        }
+        t.delta.push_back(d);
+        t.sigma.push_back(s);
+    }
+}
+
+void Group::draw_activity(Random &random, bool extreme)
+{
+    oracle::Trigger    &t = model.trigger;
+    std::vector<double> row(t.zero.size(), 0.0);
+    for (int l = 0; l < t.levels(); ++l) {
+        t.activity.push_back(row);
+        for (double &a : row) { a = std::min(a + (extreme ? static_cast<double>(random.integer(1, INT32_MAX / 10)) : random.whole(1, 150)), 2147483647.0); }
+    }
+}
+
+/* Scale, half, span and middle of one more channel. */
+void Group::add_scale(double resolution, double offset, std::int64_t low, std::int64_t high)
+{
+    const oracle::Scale s{resolution, offset, static_cast<double>(low), static_cast<double>(high)};
+    model.scale.push_back(s);
+    scale.push_back({nearest(resolution), nearest(offset), nearest(1.0 / resolution), static_cast<std::int32_t>(low), static_cast<std::int32_t>(high)});
+    const double far  = std::max(std::abs(oracle::decode(s, s.minimum)), std::abs(oracle::decode(s, s.maximum))) + std::abs(offset);
+    const double wide = resolution * (s.maximum - s.minimum);
+    /* code.h: float32 moves the nearest code by 2^-22 |code|; a few units more for encoding and decoding */
+    half.push_back(round_up(0.5 * resolution + far * (std::ldexp(1.0, -22) * (sizeof(hg_real) == 4) + 16.0 * unit)));
+    span.push_back(round_up(wide + 2.0 * static_cast<double>(half.back())));
+    middle.push_back(nearest(0.5 * (oracle::decode(s, s.minimum) + oracle::decode(s, s.maximum))));
+    model.half.push_back(static_cast<double>(half.back()));
+    model.span.push_back(static_cast<double>(span.back()));
+    model.middle.push_back(static_cast<double>(middle.back()));
+}
+
+void Group::draw_signals(Random &random, bool extreme)
+{
+    const size_t rows = static_cast<size_t>(model.trigger.interval_max + model.margin);
+    const size_t width = model.trigger.delta[0].size();
+    model.slew.assign(rows, std::vector<double>(width));
+    for (size_t g = 0; g < width; ++g) {
+        const double resolution = static_cast<double>(nearest(std::pow(10.0, random.real(-4.0, 1.0))));
+        const double offset     = static_cast<double>(nearest(resolution * random.real(-5000.0, 5000.0)));
+        add_scale(resolution, offset, extreme ? random.integer(-INT32_MAX, 0) : random.integer(-32768, 0),
+                  extreme ? random.integer(1, INT32_MAX) : random.integer(10, 32767));
+        const double wide = resolution * (model.scale[g].maximum - model.scale[g].minimum);
+        step.push_back(random.chance(0.5) ? resolution * random.real(0.0, 60.0) : wide * random.real(0.0, 0.2));
+        for (size_t j = 0; j < rows; ++j) {
+            model.slew[j][g] = std::min(model.span[g], static_cast<double>(round_up(step.back() * static_cast<double>(j + 1) + model.half[g])));
+        }
+        model.trigger.zero.push_back(random.chance(0.5) ? 0.0 : extreme ? static_cast<double>(random.integer(-INT32_MAX, INT32_MAX)) : random.whole(-9000, 9000));
+    }
+}
+
+/* Range and slew as the course shows them. */
+void Group::measure_signals(Random &random, const oracle::Table &course)
+{
+    const size_t rows = static_cast<size_t>(model.trigger.interval_max + model.margin);
+    const size_t width = course[0].size();
+    model.slew.assign(rows, std::vector<double>(width));
+    for (size_t g = 0; g < width; ++g) {
+        double far = 1e-3;
+        for (const auto &row : course) { far = std::max(far, std::abs(row[g])); }
+        const auto codes = random.integer(1000, 30000);
+        add_scale(static_cast<double>(nearest(1.01 * far / static_cast<double>(codes))), 0.0, -codes, codes);
+        for (size_t j = 0; j < rows; ++j) {
+            double most = 0.0;
+            for (size_t k = j + 1; k < course.size(); ++k) { most = std::max(most, std::abs(course[k][g] - course[k - j - 1][g])); }
+            model.slew[j][g] = std::min(model.span[g], static_cast<double>(round_up(most + model.half[g])));
+        }
+        model.trigger.zero.push_back(0.0);
+    }
+}
+
+void Group::connect()
+{
+    const oracle::Trigger &t = model.trigger;
+    for (int h : t.silence) { silence.push_back(static_cast<std::uint8_t>(h)); }
+    for (size_t l = 0; l < t.silence.size(); ++l) {
+        for (size_t g = 0; g < t.zero.size(); ++g) {
+            delta.push_back(static_cast<std::uint16_t>(t.delta[l][g]));
+            sigma.push_back(static_cast<std::int32_t>(t.sigma[l][g]));
+            activity.push_back(static_cast<std::int32_t>(t.activity[l][g]));
+        }
+    }
+    for (double z : t.zero) { zero.push_back(static_cast<std::int32_t>(z)); }
+    for (const auto &row : model.slew) {
+        for (double s : row) { slew.push_back(nearest(s)); }
+    }
+    trigger = {static_cast<std::uint8_t>(zero.size()), static_cast<std::uint8_t>(silence.size()), static_cast<std::uint8_t>(t.interval_max),
+               silence.data(), delta.data(), sigma.data(), activity.data(), zero.data()};
+    hold = {&trigger, static_cast<std::uint8_t>(model.margin), scale.data(), half.data(), slew.data(), span.data(), middle.data()};
+}
+
+Group::Group(Random &random, bool extreme)
+{
+    draw_trigger(random, random.chance(0.03) ? 0 : random.whole(1, 6), extreme);
+    draw_signals(random, extreme);
+    draw_activity(random, extreme);
+    connect();
+}
+
+Group::Group(Random &random, const oracle::Table &course)
+{
+    draw_trigger(random, static_cast<int>(course[0].size()), false);
+    measure_signals(random, course);
+    draw_activity(random, false);
+    connect();
+}
+
+std::int32_t to_library(const oracle::Code &code) { return code ? static_cast<std::int32_t>(*code) : HG_CODE_INVALID; }
+oracle::Code from_library(std::int32_t code) { return code == HG_CODE_INVALID ? oracle::Code() : oracle::Code(static_cast<double>(code)); }
+
+/* Codes that wander, jump, and vanish; not bound to any slew. */
+std::string one_trigger(Random &random, long &frames)
+{
+    const bool  extreme = random.chance(0.3);
+    const Group group(random, extreme);
+    const size_t w = group.width();
+    if (!hg_trigger_valid(&group.trigger)) { return "valid tables refused"; }
+    hg_trigger                self{};
+    std::vector<std::int32_t> memory(w + 1), code(w + 1, 0);
+    if (hg_trigger_start(&self, &group.trigger, memory.data()) != HG_OK) { return "start refused"; }
+    oracle::Sender sender(group.model.trigger);
+    const double   vanish = random.chance(0.5) ? 0.0 : 0.05;
+    oracle::Codes  now(w);
+    std::vector<double> last(w, 0.0);
+    for (int k = 0; k < 200; ++k) {
+        for (size_t g = 0; g < w; ++g) {
+            const oracle::Scale &s = group.model.scale[g];
+            const double reach = random.chance(0.1) ? (s.maximum - s.minimum) : random.chance(0.5) ? 0.0 : random.real(0.0, 200.0);
+            last[g] = std::clamp(std::round(last[g] + random.real(-reach, reach)), s.minimum, s.maximum);
+            now[g]  = random.chance(vanish) ? oracle::Code() : oracle::Code(last[g]);
+            code[g] = to_library(now[g]);
+        }
+        const bool speaks = sender.step(now);
+        frames += speaks;
+        if ((hg_trigger_step(&self, code.data()) == HG_OK) != speaks) { return say("k %d: the oracle says %s", k, speaks ? "send" : "silence"); }
+    }
+    return {};
+}
+
+void test_trigger(void **)
+{
+    Random      random = stream(4);
+    std::string failure;
+    long        frames = 0;
+    for (int i = 0; i < problems && failure.empty(); ++i) {
+        failure = one_trigger(random, frames);
+        if (!failure.empty()) { failure = say("group %d: ", i) + failure; }
+    }
+    std::printf("trigger: %.1f %% of the samples sent\n", 100.0 * static_cast<double>(frames) / (200.0 * problems));
+    expect_clean(failure);
+}
+
+/* Sender, lossy bus and receiver of one group. */
+class Link {
+public:
+    Link(Random &random, const Group &group, int quiet_from)
+        : random_(random), group_(group), quiet_from_(quiet_from), hold_(group.model), sender_memory_(group.width() + 1), memory_(2 * group.width() + 1),
+          y_(group.width()), loss_(random.chance(0.3) ? 0.0 : random.real(0.0, 0.5)), known_(random.real(0.0, 1.0)),
+          spurious_(random.chance(0.7) ? 0.0 : 0.03), vanish_(random.chance(0.7) ? 0.0 : 0.03), longest_outage_(random.chance(0.2) ? 200 : 12)
+    {
+        for (size_t g = 0; g < y_.size(); ++g) { y_[g] = static_cast<double>(group.middle[g]); }
+    }
+    std::string run(int samples);
+
+    long frames = 0, lost_frames = 0, rewinds = 0, doubts = 0;
+
+private:
+    void        walk();
+    std::string exchange(int k);
+    std::string compare(int k);
+    std::string sound() const;
+
+    Random                   &random_;
+    const Group              &group_;
+    int                       quiet_from_; /* no loss from this sample on, so that the end is known */
+    oracle::Hold              hold_;
+    hg_trigger                trigger_{};
+    hg_hold                   self_{};
+    std::vector<std::int32_t> sender_memory_, memory_;
+    std::vector<double>       y_;
+    oracle::Table             truth_, value_, radius_; /* [sample][channel]; the library's, rewritten as it says */
+    double                    loss_, known_, spurious_, vanish_;
+    int                       longest_outage_, outage_ = 0, pace_ = 0;
+    unsigned                  counter_ = 0, expected_ = 0;
+    long                      last_good_ = -1;
+    std::vector<double>       drift_;
+};
+
+/* Rest, ramps and noise, never faster than the slew table allows, never outside the range. */
+void Link::walk()
+{
+    if (drift_.empty() || random_.chance(0.05)) {
+        pace_ = random_.whole(0, 2);
+        drift_.clear();
+        for (size_t g = 0; g < y_.size(); ++g) { drift_.push_back(random_.chance(0.5) ? 1.0 : -1.0); }
+    }
+    for (size_t g = 0; g < y_.size(); ++g) {
+        const oracle::Scale &s = group_.model.scale[g];
+        const double move = pace_ == 0 ? 0.05 * random_.real(-1.0, 1.0) : pace_ == 1 ? drift_[g] : random_.real(-1.0, 1.0);
+        y_[g] = std::clamp(y_[g] + move * group_.step[g], oracle::decode(s, s.minimum), oracle::decode(s, s.maximum));
+    }
+    truth_.push_back(y_);
+}
+
+/* One sample of sender and bus, the same for both receivers. */
+std::string Link::exchange(int k)
+{
+    std::vector<std::int32_t> code(group_.width() + 1, 0);
+    oracle::Codes             codes(group_.width());
+    for (size_t g = 0; g < group_.width(); ++g) {
+        const bool vanished = random_.chance(vanish_);
+        code[g]  = hg_code_encode(&group_.scale[g], vanished ? std::numeric_limits<hg_real>::quiet_NaN() : nearest(y_[g]));
+        codes[g] = from_library(code[g]);
+        const oracle::Scale &s = group_.model.scale[g];
+        if (vanished && codes[g]) { return "NaN has a code"; }
+        if (codes[g] && !(std::abs(oracle::decode(s, *codes[g]) - y_[g]) <= static_cast<double>(group_.half[g]))) {
+            return say("k %d: code %.0f of %.17g is off by more than half", k, *codes[g], y_[g]);
+        }
+    }
+    const bool quiet = k >= quiet_from_;
+    if (quiet) { outage_ = 0; }
+    if (!quiet && random_.chance(spurious_)) { /* a damaged frame that was none of this sender's */
+        hold_.lose();
+        hg_hold_lose(&self_);
+    }
+    if (!quiet && outage_ == 0 && random_.chance(0.01)) { outage_ = random_.whole(1, longest_outage_); }
+    if (hg_trigger_step(&trigger_, code.data()) == HG_OK) {
+        const unsigned counter = counter_++ % 16U;
+        const bool     lost    = !quiet && (outage_ > 0 || random_.chance(loss_));
+        ++frames;
+        if (lost) {
+            ++lost_frames;
+            if (random_.chance(known_)) {
+                hold_.lose();
+                hg_hold_lose(&self_);
+            }
+        } else {
+            const bool continues = last_good_ < 0 ? random_.chance(0.5) : counter == expected_;
+            expected_  = (counter + 1U) % 16U;
+            last_good_ = k;
+            hold_.receive({codes, continues});
+            if (hg_hold_receive(&self_, code.data(), continues) != HG_OK) { return say("k %d: a frame refused", k); }
+            if (random_.chance(0.05) && hg_hold_receive(&self_, code.data(), false) != HG_E_REPEATED) { return say("k %d: a second frame taken", k); }
+            if (!quiet && random_.chance(spurious_)) {
+                hold_.lose();
+                hg_hold_lose(&self_);
+            }
+        }
+    }
+    outage_ = std::max(0, outage_ - 1);
+    return {};
+}
+
+/* Step both receivers; the whole past must agree as it is known now, rewritten or not. */
+std::string Link::compare(int k)
+{
+    const size_t w = group_.width();
+    Reals        value(w + 1), radius(w + 1), past(w + 1);
+    std::uint8_t rewind = 0;
+    hold_.step();
+    hg_hold_step(&self_, value.data(), radius.data(), &rewind);
+    value_.emplace_back(value.begin(), value.end() - 1);
+    radius_.emplace_back(radius.begin(), radius.end() - 1);
+    for (int lag = 1; lag <= rewind; ++lag) {
+        hg_hold_past(&self_, static_cast<std::uint8_t>(lag), past.data());
+        if (lag <= k) { radius_[static_cast<size_t>(k - lag)].assign(past.begin(), past.end() - 1); }
+    }
+    rewinds += hold_.rewound();
+    doubts  += hold_.doubt();
+    const int from = (hold_.rewound() || rewind > 0) ? 0 : k;
+    for (int j = from; j <= k; ++j) {
+        for (size_t g = 0; g < w; ++g) {
+            const oracle::Scale &s = group_.model.scale[g];
+            const size_t at    = static_cast<size_t>(j);
+            const double v     = hold_.values()[at][g], r = hold_.radii()[at][g];
+            const double v_tol = 4.0 * unit * (std::abs(s.offset) + std::abs(v - s.offset)); /* one product, one sum */
+            if (!(std::abs(value_[at][g] - v) <= v_tol)) { return say("k %d, sample %d: value %.17g, oracle %.17g", k, j, value_[at][g], v); }
+            if (!(std::abs(radius_[at][g] - r) <= 4.0 * unit * r)) {
+                return say("k %d, sample %d, channel %zu: radius %.17g, oracle %.17g (rewind %d, oracle %d, last frame %ld, half %g, span %g)", k, j, g,
+                           radius_[at][g], r, rewind, hold_.rewound(), last_good_, group_.model.half[g], group_.model.span[g]);
+            }
+        }
+    }
+    if (hg_hold_doubt(&self_) != hold_.doubt()) { return say("k %d: doubt %d, oracle %d, last frame %ld", k, hg_hold_doubt(&self_), hold_.doubt(), last_good_); }
+    if (static_cast<int>(hg_hold_health(&self_)) != static_cast<int>(hold_.health())) {
+        return say("k %d: health %d, oracle %d, last frame %ld", k, static_cast<int>(hg_hold_health(&self_)), static_cast<int>(hold_.health()), last_good_);
+    }
+    return {};
+}
+
+/* The one promise that matters: |true - value| <= radius, once the frame after a sample has settled it. */
+std::string Link::sound() const
+{
+    for (size_t k = 0; k <= static_cast<size_t>(last_good_); ++k) {
+        for (size_t g = 0; g < group_.width(); ++g) {
+            if (!(std::abs(truth_[k][g] - value_[k][g]) <= radius_[k][g])) {
+                return say("sample %zu, channel %zu: |%.17g - %.17g| > %.17g", k, g, truth_[k][g], value_[k][g], radius_[k][g]);
+            }
+        }
+    }
+    return {};
+}
+
+std::string Link::run(int samples)
+{
+    std::string failure;
+    if (hg_trigger_start(&trigger_, &group_.trigger, sender_memory_.data()) != HG_OK) { return "sender refused"; }
+    if (hg_hold_start(&self_, &group_.hold, memory_.data()) != HG_OK) { return "hold refused"; }
+    for (int k = 0; k < samples && failure.empty(); ++k) {
+        walk();
+        failure = exchange(k);
+        if (failure.empty()) { failure = compare(k); }
+    }
+    return failure.empty() ? sound() : failure;
+}
+
+void test_hold(void **)
+{
+    Random      random = stream(5);
+    std::string failure;
+    long        frames = 0, lost = 0, rewinds = 0, doubts = 0;
+    for (int i = 0; i < problems && failure.empty(); ++i) {
+        const Group group(random, random.chance(0.1));
+        Link        link(random, group, 400);
+        failure = link.run(400 + 2 * group.trigger.interval_max + 2);
+        if (!failure.empty()) { failure = say("group %d (width %zu, levels %d, interval_max %d, margin %d): ", i, group.width(), group.trigger.levels,
+                                              group.trigger.interval_max, group.hold.margin) + failure; }
+        frames += link.frames;
+        lost += link.lost_frames;
+        rewinds += link.rewinds;
+        doubts += link.doubts;
+    }
+    std::printf("hold: %ld frames, %ld lost, %ld rewinds, %ld samples in doubt\n", frames, lost, rewinds, doubts);
+    expect_clean(failure);
+}
+
+/* ---- d) The decision ---- */
+
+/* Evidence as a bus can bring it: doubt lasts until the group's next frame, and only that frame can rewind. */
+class Witness {
+public:
+    Witness(Random &random, int groups, int generators) : random_(random), groups_(groups), generators_(generators) {}
+    oracle::Evidence next()
+    {
+        oracle::Evidence e;
+        if (random_.chance(0.05)) { calm_ = random_.real(0.0, 1.0); }
+        if (random_.chance(0.1)) { ready_ = random_.chance(0.8); }
+        for (int i = 0; i < groups_; ++i) {
+            const unsigned bit = 1U << i;
+            if (random_.chance(0.35)) { /* a frame */
+                if (random_.chance((doubt_ & bit) != 0 ? 0.3 : 0.02)) { e.rewound |= bit; }
+                doubt_ &= ~bit;
+            } else if (random_.chance(0.6)) {
+                doubt_ |= bit;
+            }
+        }
+        e.doubt = doubt_;
+        e.ready = ready_;
+        for (int g = 0; g < generators_; ++g) { e.alarm.push_back(random_.chance(calm_)); }
+        return e;
+    }
+
+private:
+    Random  &random_;
+    int      groups_, generators_;
+    double   calm_  = 0.3;
+    bool     ready_ = false;
+    unsigned doubt_ = 0;
+};
+
+std::string one_decision(Random &random, std::vector<long> &seen)
+{
+    const int     groups = random.whole(1, 8), generators = random.whole(1, random.chance(0.2) ? HG_GENERATORS_MAX : 4);
+    oracle::Rules rules;
+    std::vector<std::uint8_t> feeds;
+    for (int g = 0; g < generators; ++g) {
+        rules.feeds.push_back(static_cast<unsigned>(random.integer(0, (1 << groups) - 1)));
+        rules.faults.push_back(static_cast<std::uint32_t>(random.integer(0, 0xFFFFFFFFLL)));
+        feeds.push_back(static_cast<std::uint8_t>(rules.feeds.back()));
+    }
+    rules.up    = random.chance(0.5) ? 1 : random.whole(1, 6);
+    rules.down  = random.chance(0.3) ? 1 : random.whole(1, 10);
+    rules.latch = random.chance(0.2);
+    const hg_decision_config config{static_cast<std::uint8_t>(generators), feeds.data(), rules.faults.data(), static_cast<std::uint8_t>(rules.up),
+                                    static_cast<std::uint8_t>(rules.down), rules.latch};
+    std::vector<hg_alarm> memory(static_cast<size_t>(generators));
+    hg_decision           self{};
+    if (hg_decision_start(&self, &config, memory.data()) != HG_OK) { return "start refused"; }
+    oracle::Decision decision(rules);
+    Witness          witness(random, groups, generators);
+    for (int k = 0; k < 300; ++k) {
+        if (random.chance(0.003)) {
+            hg_decision_reset(&self);
+            decision.reset();
+        }
+        const oracle::Evidence e = witness.next();
+        hg_evidence            evidence{0, e.ready, static_cast<std::uint8_t>(e.doubt), static_cast<std::uint8_t>(e.rewound)};
+        for (size_t g = 0; g < e.alarm.size(); ++g) { evidence.alarm |= e.alarm[g] ? (1U << g) : 0U; }
+        std::uint32_t       candidates = 0;
+        const hg_plant      plant    = hg_decision_step(&self, &evidence, &candidates);
+        const oracle::State expected = decision.step(e);
+        ++seen[static_cast<size_t>(expected)];
+        if (static_cast<int>(plant) != static_cast<int>(expected)) {
+            return say("k %d (up %d, down %d, latch %d, generators %d, feeds %x): plant %d, oracle %d; alarm %x ready %d doubt %x rewound %x", k, rules.up, rules.down,
+                       rules.latch, generators, rules.feeds[0], static_cast<int>(plant), static_cast<int>(expected), evidence.alarm, evidence.ready,
+                       evidence.doubt, evidence.rewound);
+        }
+        if (candidates != decision.candidates()) {
+            return say("k %d (up %d, down %d, latch %d, generators %d): candidates %x, oracle %x; plant %d alarm %x ready %d doubt %x rewound %x", k, rules.up,
+                       rules.down, rules.latch, generators, candidates, decision.candidates(), static_cast<int>(plant), evidence.alarm, evidence.ready,
+                       evidence.doubt, evidence.rewound);
+        }
+    }
+    return {};
+}
+
+void test_decision(void **)
+{
+    Random            random = stream(6);
+    std::vector<long> seen(4, 0);
+    std::string       failure;
+    for (int i = 0; i < problems && failure.empty(); ++i) {
+        failure = one_decision(random, seen);
+        if (!failure.empty()) { failure = say("decision %d: ", i) + failure; }
+    }
+    std::printf("decision: %ld starting, %ld none, %ld provisional, %ld confirmed\n", seen[0], seen[1], seen[2], seen[3]);
+    expect_clean(failure);
+}
+
+/* ---- The whole detector ---- */
+
+/* A plant with one or two observers, its signals in random order in one to three groups, over a bus that loses frames. The oracle's holds,
+ *  cascades and thresholds run beside hg_detector; and while there is no fault nothing may be confirmed, whatever the bus does. */
+class Chain {
+public:
+    Chain(Random &random, long &confirmed);
+    Chain(const Chain &) = delete;
+    Chain &operator=(const Chain &) = delete;
+    std::string run();
+
+private:
+    static constexpr int samples_ = 240, fault_ = 160; /* an actuator fault from this sample on */
+    struct Observer {
+        Loop                      loop;
+        System                    system;
+        Vector                    rounding;
+        Tail                      tail;
+        std::optional<oracle::Cascade> cascade;
+        std::optional<oracle::Hull>    hull;
+        std::optional<Residual>        residual;
+        std::optional<HullTables>      tables;
+    };
+    void        drive();
+    void        build_groups();
+    void        build(Observer &o);
+    void        connect();
+    void        transmit(size_t group, int k);
+    std::string judge(int k);
+    std::string compare(Observer &o, size_t at, int k, bool &alarm) const;
+
+    Random                            &random_;
+    long                              &confirmed_;
+    Loop                               first_;
+    bool                               rest_;
+    double                             loss_, known_;
+    oracle::Table                      course_; /* [sample][column]: readings y, then u as it is measured */
+    std::vector<std::uint8_t>          place_;  /* [column] in the signal vector */
+    std::vector<std::unique_ptr<Group>>  groups_;
+    std::vector<size_t>                  group_first_;
+    std::vector<std::unique_ptr<oracle::Hold>> holds_;
+    std::vector<hg_trigger>            senders_;
+    std::vector<std::vector<std::int32_t>> sender_memory_;
+    std::vector<unsigned>              counter_, expected_;
+    std::vector<std::unique_ptr<Observer>> observers_;
+
+    oracle::Rules                      rules_;
+    std::optional<oracle::Decision>    decision_;
+    std::vector<hg_hold_config>        hold_config_;
+    std::vector<hg_residual_config>    residual_config_;
+    std::vector<hg_hull_config>        hull_config_;
+    std::vector<std::uint8_t>          feeds_;
+    std::vector<hg_hold>               hold_memory_;
+    std::vector<hg_residual>           residual_memory_;
+    std::vector<hg_hull>               hull_memory_;
+    std::vector<hg_alarm>              alarm_memory_;
+    std::vector<std::int32_t>          code_memory_;
+    Reals                              real_memory_;
+    hg_detector_config                 config_{};
+    hg_detector                        self_{};
+};
+
+Chain::Chain(Random &random, long &confirmed)
+    : random_(random), confirmed_(confirmed), first_(random_loop(random)), rest_(random.chance(0.5)), loss_(random.real(0.0, 0.4)),
+      known_(random.real(0.0, 1.0))
+{
+    drive();
+    build_groups();
+    for (int i = random.whole(1, 2); i > 0; --i) {
+        observers_.push_back(std::make_unique<Observer>());
+        observers_.back()->loop = first_;
+        if (i == 2) { draw_observer(random, observers_.back()->loop); }
+        build(*observers_.back());
+    }
+    connect();
+}
+
+/* Manoeuvres: steps of the input, disturbances and noise within their bounds, an actuator fault at the end. */
+void Chain::drive()
+{
+    const oracle::Plant &p = first_.plant;
+    const Eigen::Index   m = p.C.rows(), inputs = p.B.cols();
+    Vector x = first_.initial, u = Vector::Zero(inputs), fault = 2.0 * random_.matrix(inputs, 1);
+    if (!rest_) { x *= 2.0; }
+    for (Eigen::Index i = 0; i < x.size(); ++i) { x(i) *= random_.real(-1.0, 1.0); }
+    for (int k = 0; k < samples_; ++k) {
+        if (random_.chance(0.05)) { u = random_.matrix(inputs, 1); }
+        const Vector d = random_.matrix(p.Ed.cols(), 1), real_u = (k >= fault_) ? Vector(u + fault) : u;
+        const Vector y = p.C * x + p.D * real_u + p.Fd * d;
+        x = p.A * x + p.B * real_u + p.Ed * d;
+        std::vector<double> row(y.data(), y.data() + m);
+        row.insert(row.end(), u.data(), u.data() + inputs);
+        course_.push_back(row);
+    }
+}
+
+void Chain::build_groups()
+{
+    const auto width = static_cast<Eigen::Index>(course_[0].size());
+    place_ = random_places(random_, width, width);
+    const int count = random_.whole(1, std::min(3, static_cast<int>(width)));
+    size_t    first = 0;
+    for (int i = 0; i < count; ++i) {
+        const size_t after = (i == count - 1) ? place_.size() : first + 1 + static_cast<size_t>(random_.whole(0, static_cast<int>(place_.size() - first) - (count - i)));
+        oracle::Table part(course_.size());
+        for (size_t k = 0; k < course_.size(); ++k) {
+            for (size_t at = first; at < after; ++at) {
+                const auto column = std::find(place_.begin(), place_.end(), static_cast<std::uint8_t>(at)) - place_.begin();
+                part[k].push_back(course_[k][static_cast<size_t>(column)]);
+            }
+        }
+        groups_.push_back(std::make_unique<Group>(random_, part));
+        holds_.push_back(std::make_unique<oracle::Hold>(groups_.back()->model));
+        group_first_.push_back(first);
+        first = after;
+    }
+}
+
+/* Tables of one generator: bias by the error system, a rounding bound for values up to three times the readings, taps that reach back as far
+ *  as a hold can rewrite. */
+void Chain::build(Observer &o)
+{
+    Vector in_max = Vector::Zero(static_cast<Eigen::Index>(place_.size())), z_max = Vector::Zero(o.loop.generator.G.rows());
+    oracle::Cascade run(o.loop.generator);
+    const Eigen::Index m = o.loop.generator.V.cols();
+    for (const auto &row : course_) {
+        const Vector in = Eigen::Map<const Vector>(row.data(), static_cast<Eigen::Index>(row.size()));
+        in_max = in_max.cwiseMax(in.cwiseAbs());
+        run.step(in.head(m), in.tail(in.size() - m));
+        z_max = z_max.cwiseMax((run.observer() + run.filter()).cwiseAbs());
+    }
+    o.system   = fused(o.loop.generator);
+    o.rounding = rounding(o.system, m, 3.0 * z_max, 3.0 * in_max, unit);
+    const int taps = random_.whole(36, 90);
+    o.tail = tail_of(o.system, taps);
+    Loop wide = o.loop;
+    wide.initial *= 2.0; /* the state range */
+    Matrix rest = bias_by_error(o.loop, samples_ + 1), moving = bias_by_error(wide, samples_ + 1);
+    rest.rowwise() += o.rounding.transpose();
+    moving.rowwise() += o.rounding.transpose();
+    o.residual.emplace(o.system, place_);
+    o.tables.emplace(o.system, place_, taps, rest, moving, o.tail, 10, 10);
+    if (!rest_) { o.loop = wide; }
+    o.cascade.emplace(o.loop.generator);
+    o.hull.emplace(o.loop.generator, o.loop.plant, o.loop.initial);
+}
+
+void Chain::connect()
+{
+    std::uint8_t history = 0;
+    std::uint16_t residuals = 0;
+    for (const auto &o : observers_) {
+        residual_config_.push_back(o->residual->config);
+        hull_config_.push_back(o->tables->config);
+        history = std::max(history, static_cast<std::uint8_t>(o->tables->config.taps + 1));
+        residuals = static_cast<std::uint16_t>(residuals + o->residual->config.residuals);
+        rules_.feeds.push_back((1U << groups_.size()) - 1U);
+        rules_.faults.push_back(static_cast<std::uint32_t>(random_.integer(1, 255)));
+        feeds_.push_back(static_cast<std::uint8_t>(rules_.feeds.back()));
+    }
+    rules_.down = random_.whole(1, 5);
+    decision_.emplace(rules_);
+    for (const auto &g : groups_) {
+        hold_config_.push_back(g->hold);
+        sender_memory_.emplace_back(g->width());
+        senders_.emplace_back();
+        hg_trigger_start(&senders_.back(), &g->trigger, sender_memory_.back().data());
+    }
+    counter_.assign(groups_.size(), 0U);
+    expected_ = counter_;
+    const auto signals = static_cast<std::uint8_t>(place_.size()), groups = static_cast<std::uint8_t>(groups_.size());
+    const auto generators = static_cast<std::uint8_t>(observers_.size());
+    config_ = {signals, groups, hold_config_.data(), generators, residual_config_.data(), hull_config_.data(),
+               {generators, feeds_.data(), rules_.faults.data(), 1, static_cast<std::uint8_t>(rules_.down), false},
+               history, residuals, static_cast<std::uint16_t>(2 * signals), 0};
+    config_.reals = hg_detector_reals(&config_);
+    hold_memory_.resize(groups);
+    residual_memory_.resize(generators);
+    hull_memory_.resize(generators);
+    alarm_memory_.resize(generators);
+    code_memory_.resize(config_.codes);
+    real_memory_.resize(config_.reals);
+}
+
+/* One group's sender and bus, the same frames for both sides. */
+void Chain::transmit(size_t group, int k)
+{
+    const Group              &g = *groups_[group];
+    std::vector<std::int32_t> code;
+    oracle::Codes             codes;
+    for (size_t c = 0; c < g.width(); ++c) {
+        const auto column = std::find(place_.begin(), place_.end(), static_cast<std::uint8_t>(group_first_[group] + c)) - place_.begin();
+        code.push_back(hg_code_encode(&g.scale[c], nearest(course_[static_cast<size_t>(k)][static_cast<size_t>(column)])));
+        codes.push_back(from_library(code.back()));
+    }
+    if (hg_trigger_step(&senders_[group], code.data()) != HG_OK) { return; }
+    const unsigned counter = counter_[group]++ % 16U;
+    const auto     index   = static_cast<std::uint8_t>(group);
+    if (random_.chance(loss_)) {
+        if (random_.chance(known_)) {
+            holds_[group]->lose();
+            hg_detector_lose(&self_, index);
+        }
+        return;
+    }
+    const bool continues = counter == expected_[group];
+    expected_[group] = (counter + 1U) % 16U;
+    holds_[group]->receive({codes, continues});
+    hg_detector_receive(&self_, index, code.data(), continues);
+}
+
+/* r and J of one generator against the oracle's cascade and full-history hull over the radii as they are known now. */
+std::string Chain::compare(Observer &o, size_t at, int k, bool &alarm) const
+{
+    const Eigen::Index  m = o.loop.generator.V.cols(), width = static_cast<Eigen::Index>(place_.size());
+    std::vector<Vector> radius(static_cast<size_t>(k + 1), Vector(width)), y, u;
+    Vector              value(width);
+    double              widest = 0.0;
+    for (Eigen::Index c = 0; c < width; ++c) {
+        const size_t place = place_[static_cast<size_t>(c)];
+        size_t       group = groups_.size() - 1;
+        while (group_first_[group] > place) { --group; }
+        value(c) = holds_[group]->value()[place - group_first_[group]];
+        for (size_t j = 0; j <= static_cast<size_t>(k); ++j) {
+            radius[j](c) = holds_[group]->radii()[j][place - group_first_[group]];
+            widest       = std::max(widest, radius[j](c));
+        }
+    }
+    for (const Vector &row : radius) {
+        y.push_back(row.head(m));
+        u.push_back(row.tail(width - m));
+    }
+    const Vector r = o.cascade->step(value.head(m), value.tail(width - m)), J = o.hull->threshold(y, u);
+    for (Eigen::Index i = 0; i < r.size(); ++i) {
+        const double lib_r = static_cast<double>(self_.r[at + static_cast<size_t>(i)]), lib_J = static_cast<double>(self_.J[at + static_cast<size_t>(i)]);
+        const double tail  = o.tail.output(i) * o.tail.input.maxCoeff() * widest / (1.0 - o.tail.decay);
+        if (!(std::abs(lib_r - r(i)) <= o.rounding(i) + 1e-12)) { return say("k %d: r %.17g, oracle %.17g", k, lib_r, r(i)); }
+        if (!(lib_J >= J(i) * (1.0 - 1e-12))) { return say("k %d: J %.17g below the exact hull %.17g", k, lib_J, J(i)); }
+        if (!(lib_J <= (J(i) + o.rounding(i) + 1.1 * tail) * 1.01)) { return say("k %d: J %.17g, exact %.17g, tail at most %g", k, lib_J, J(i), tail); }
+        alarm = alarm || std::abs(lib_r) > lib_J; /* the library's numbers: a tie may fall either way within rounding */
+    }
+    return {};
+}
+
+std::string Chain::judge(int k)
+{
+    hg_finding finding{};
+    if (hg_detector_step(&self_, &finding) != HG_OK) { return say("k %d: step refused", k); }
+    oracle::Evidence evidence;
+    evidence.ready = k + 1 >= 10;
+    for (size_t g = 0; g < groups_.size(); ++g) {
+        holds_[g]->step();
+        evidence.doubt |= static_cast<unsigned>(holds_[g]->doubt()) << g;
+        evidence.rewound |= static_cast<unsigned>(holds_[g]->rewound()) << g;
+        if (static_cast<int>(hg_hold_health(&hold_memory_[g])) != static_cast<int>(holds_[g]->health())) { return say("k %d: health of group %zu", k, g); }
+    }
+    size_t at = 0;
+    for (const auto &o : observers_) {
+        bool              alarm = false;
+        const std::string failure = compare(*o, at, k, alarm);
+        if (!failure.empty()) { return failure; }
+        evidence.alarm.push_back(alarm);
+        at += o->residual->config.residuals;
+    }
+    const oracle::State state = decision_->step(evidence);
+    if (k < fault_ && finding.plant == HG_PLANT_CONFIRMED) { return say("k %d: a false alarm is confirmed", k); }
+    if (static_cast<int>(finding.plant) != static_cast<int>(state)) {
+        return say("k %d (down %d): plant %d, oracle %d", k, rules_.down, static_cast<int>(finding.plant), static_cast<int>(state));
+    }
+    if (finding.candidates != decision_->candidates()) { return say("k %d: candidates %x, oracle %x", k, finding.candidates, decision_->candidates()); }
+    confirmed_ += state == oracle::State::confirmed;
+    return {};
+}
+
+std::string Chain::run()
+{
+    const hg_detector_memory memory{hold_memory_.data(), residual_memory_.data(), hull_memory_.data(), alarm_memory_.data(), code_memory_.data(),
+                                    config_.codes, real_memory_.data(), config_.reals};
+    if (hg_detector_start(&self_, &config_, &memory, rest_ ? HG_START_REST : HG_START_MOVING) != HG_OK) { return "start refused"; }
+    std::string failure;
+    for (int k = 0; k < samples_ && failure.empty(); ++k) {
+        for (size_t g = 0; g < groups_.size(); ++g) { transmit(g, k); }
+        failure = judge(k);
+    }
+    return failure;
+}
+
+void test_detector(void **)
+{
+    Random      random = stream(7);
+    std::string failure;
+    long        confirmed = 0;
+    for (int i = 0; i < problems / 2 && failure.empty(); ++i) {
+        Chain chain(random, confirmed);
+        failure = chain.run();
+        if (!failure.empty()) { failure = say("detector %d: ", i) + failure; }
+    }
+    std::printf("detector: %ld samples confirmed after the fault\n", confirmed);
+    if (failure.empty() && confirmed == 0) { failure = "no fault was ever found"; }
+    expect_clean(failure);
+}
+
+} // namespace
+
+int main()
+{
+    const char *seed = std::getenv("HULLGUARD_SEED");
+    the_seed = seed != nullptr ? std::strtoull(seed, nullptr, 10) : std::random_device{}();
+    std::printf("HULLGUARD_SEED=%llu (%s)\n", static_cast<unsigned long long>(the_seed), sizeof(hg_real) == 8 ? "float64" : "float32");
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(test_residual), cmocka_unit_test(test_hull),  cmocka_unit_test(test_oracle_itself),
+        cmocka_unit_test(test_trigger),  cmocka_unit_test(test_hold), cmocka_unit_test(test_decision),
+        cmocka_unit_test(test_detector),
+    };
+    return cmocka_run_group_tests_name("oracle", tests, nullptr, nullptr);
+}
