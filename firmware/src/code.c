@@ -8,7 +8,8 @@ int32_t hg_code_encode(const hg_code_scale *scale, hg_real value)
         /* Bounded before the conversion, which is undefined outside int32_t. */
         if ((exact > (HG_REAL_C(-2147483000.0))) && (exact < HG_REAL_C(2147483000.0))) {
             const hg_real half = (exact < HG_REAL_ZERO) ? HG_REAL_C(-0.5) : HG_REAL_C(0.5);
-            const int32_t nearest = (int32_t)(exact + half);
+            const hg_real moved = exact + half;
+            const int32_t nearest = (int32_t)moved; /* towards zero */
             code = hg_code_valid(scale, nearest) ? nearest : HG_CODE_INVALID;
         }
     }

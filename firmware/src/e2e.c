@@ -4,15 +4,14 @@
 #define START 0xFFU
 #define FINAL_XOR 0xFFU
 
-/* CRC-8H2F by nibbles: remainder of n x^4 by x^8 + x^5 + x^3 + x^2 + x + 1. 16 bytes of flash instead of 256. */
-static const uint8_t crc_nibble[16] = {0x00U, 0x2FU, 0x5EU, 0x71U, 0xBCU, 0x93U, 0xE2U, 0xCDU,
-                                      0x57U, 0x78U, 0x09U, 0x26U, 0xEBU, 0xC4U, 0xB5U, 0x9AU};
-
 static uint8_t crc_byte(uint8_t crc, uint8_t byte)
 {
+    /* CRC-8H2F by nibbles: remainder of n x^4 by x^8 + x^5 + x^3 + x^2 + x + 1. 16 bytes of flash instead of 256. */
+    static const uint8_t nibble[16] = {0x00U, 0x2FU, 0x5EU, 0x71U, 0xBCU, 0x93U, 0xE2U, 0xCDU,
+                                       0x57U, 0x78U, 0x09U, 0x26U, 0xEBU, 0xC4U, 0xB5U, 0x9AU};
     uint8_t sum = crc ^ byte;
-    sum = (uint8_t)((uint8_t)(sum << 4U) ^ crc_nibble[sum >> 4U]);
-    return (uint8_t)((uint8_t)(sum << 4U) ^ crc_nibble[sum >> 4U]);
+    sum = (uint8_t)((uint8_t)(sum << 4U) ^ nibble[sum >> 4U]);
+    return (uint8_t)((uint8_t)(sum << 4U) ^ nibble[sum >> 4U]);
 }
 
 static bool length_good(uint8_t length)

@@ -55,8 +55,8 @@ hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
         return HG_E_REPEATED;
     }
     const hg_trigger_config *trigger = self->config->trigger;
-    /* A group that was stale may have lost as many frames as the counter counts: its continuing proves nothing. */
-    const bool whole = continues && (!self->lost) && (self->age < horizon(self->config)) && (self->good > 0U);
+    /* Silence beyond interval_max has set lost: the counter may have run round since, and its continuing proves nothing. */
+    const bool whole = continues && (!self->lost) && (self->good > 0U);
     self->gap = self->doubt && (!whole);
     self->gap_age = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
     for (uint8_t g = 0U; g < trigger->width; g++) {
@@ -103,7 +103,7 @@ static int32_t threshold(const hg_hold *self, uint8_t g)
 
 static hg_real slew(const hg_hold_config *config, uint8_t age, uint8_t g)
 {
-    return config->slew[((uint16_t)(age - 1U) * config->trigger->width) + g];
+    return config->slew[(((uint32_t)age - 1U) * config->trigger->width) + g];
 }
 
 /* Radius of channel g between frames; sets *conditional where it relies on the sender's silence. */

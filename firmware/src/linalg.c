@@ -15,8 +15,8 @@ void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, c
             sum = hg_acc_mac(sum, b[j], y[j]);
         }
         out[i] = hg_acc_real(sum, m->exponent);
-        a += m->cols;
-        b += n->cols;
+        a = &a[m->cols];
+        b = &b[n->cols];
     }
 }
 

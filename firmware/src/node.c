@@ -225,7 +225,9 @@ static uint16_t bus_of(const hg_node *self)
 {
     uint16_t bus = 0U;
     for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
-        bus |= (uint16_t)((uint16_t)hg_hold_health(&self->detector.memory.hold[i]) << (2U * i));
+        const uint32_t health = (uint32_t)hg_hold_health(&self->detector.memory.hold[i]);
+        const uint32_t place = 2U * (uint32_t)i;
+        bus |= (uint16_t)(health << place);
     }
     return bus;
 }
@@ -345,11 +347,13 @@ hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, 
     hg_e2e_receiver_start(&fresh);
     const hg_status status = hg_e2e_p22_receive(&fresh, frame->data, frame->length, message->data_id, &header);
     if (status == HG_OK) {
+        const uint8_t plant = frame->data[2] & 0x3U;
+        const uint8_t basis = (frame->data[2] >> 2U) & 0x3U;
         *verdict = (hg_verdict){.k = ((uint32_t)frame->data[7] << 4U) | header.stamp,
                                 .model_hash = 0U,
                                 .candidates = (uint32_t)frame->data[3] | ((uint32_t)frame->data[4] << 8U),
-                                .plant = (hg_plant)(frame->data[2] & 0x3U),
-                                .basis = (hg_basis)((frame->data[2] >> 2U) & 0x3U),
+                                .plant = (hg_plant)plant,
+                                .basis = (hg_basis)basis,
                                 .bus = (uint16_t)(frame->data[5] | ((uint16_t)frame->data[6] << 8U)),
                                 .refused = (frame->data[2] & 0x20U) != 0U};
         *reply = (frame->data[2] & 0x10U) != 0U;

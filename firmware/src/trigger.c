@@ -11,7 +11,7 @@ static uint32_t distance(int32_t a, int32_t b)
     return (uint32_t)((difference < 0) ? -difference : difference);
 }
 
-static uint16_t cell(const hg_trigger_config *config, uint8_t level, uint8_t channel)
+static uint16_t entry(const hg_trigger_config *config, uint8_t level, uint8_t channel)
 {
     return (uint16_t)(((uint16_t)level * config->width) + channel);
 }
@@ -26,7 +26,7 @@ bool hg_trigger_valid(const hg_trigger_config *config)
     for (uint8_t level = 0U; valid && (level < config->levels); level++) {
         valid = config->silence[level] < config->interval_max;
         for (uint8_t g = 0U; valid && (g < config->width); g++) {
-            valid = config->sigma[cell(config, level, g)] >= 0;
+            valid = config->sigma[entry(config, level, g)] >= 0;
         }
     }
     return valid;
@@ -36,7 +36,7 @@ int32_t hg_trigger_threshold(const hg_trigger_config *config, uint8_t level, uin
 {
     int32_t threshold = 0;
     if (sent != HG_CODE_INVALID) {
-        const uint16_t i = cell(config, level, channel);
+        const uint16_t i = entry(config, level, channel);
         const uint64_t relative = ((uint64_t)config->delta[i] * distance(sent, config->zero[channel])) >> DELTA_SHIFT;
         const uint64_t sum = relative + (uint64_t)(uint32_t)config->sigma[i];
         threshold = (sum > (uint64_t)INT32_MAX) ? INT32_MAX : (int32_t)sum;
@@ -47,7 +47,7 @@ int32_t hg_trigger_threshold(const hg_trigger_config *config, uint8_t level, uin
 /* Did channel g move by at least the activity of this level? */
 static bool active(const hg_trigger_config *config, uint8_t level, uint8_t g, int32_t sent, int32_t previous)
 {
-    const int32_t least = config->activity[cell(config, level, g)];
+    const int32_t least = config->activity[entry(config, level, g)];
     return (sent == HG_CODE_INVALID) || (previous == HG_CODE_INVALID) || ((int64_t)distance(sent, previous) >= (int64_t)least);
 }
 

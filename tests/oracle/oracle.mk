@@ -1,37 +1,35 @@
 # The independent check: the library against a second implementation in double precision (Eigen), on random problems.
-# Included by the top Makefile. HULLGUARD_SEED=n repeats a run.
+# HULLGUARD_SEED=n repeats a run. The library is built here with both sanitizers, because random tables reach corners that fixed ones do not.
 
-BUILD ?= build
-ORACLE_DIR   := $(patsubst %/,%,$(dir $(lastword $(MAKEFILE_LIST))))
+ORACLE       := tests/oracle
 ORACLE_BUILD := $(BUILD)/oracle
 ORACLE_EIGEN ?= /usr/include/eigen3
-ORACLE_CXXFLAGS := -std=c++17 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
-                   -isystem $(ORACLE_EIGEN) -Ifirmware/include -MMD -MP
+ORACLE_CXX   := $(CXX) -std=c++17 -O2 -g -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
+                -isystem $(ORACLE_EIGEN) -Ifirmware/include $(DEPEND)
+ORACLE_PROGRAMS := $(REALS:%=$(ORACLE_BUILD)/test_oracle_%) $(ORACLE_BUILD)/oracle_run
+OBJECTS += $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o $(REALS:%=$(ORACLE_BUILD)/test_oracle_%.o)
 
-.PHONY: oracle oracle-build
-oracle: oracle-build
-	$(ORACLE_BUILD)/test_oracle_f32
-	$(ORACLE_BUILD)/test_oracle_f64
-	sh $(ORACLE_DIR)/test_oracle_run.sh $(ORACLE_BUILD)/oracle_run $(ORACLE_DIR)
+.PHONY: oracle
+oracle: $(ORACLE_PROGRAMS) ## the library against an independent implementation in double precision (random; HULLGUARD_SEED=n repeats)
+	$(Q)set -e; for real in $(REALS); do timeout 300 $(ORACLE_BUILD)/test_oracle_$$real; done
+	$(Q)sh $(ORACLE)/test_oracle_run.sh $(ORACLE_BUILD)/oracle_run $(ORACLE)
+TEST_PARTS += oracle
 
-oracle-build: $(ORACLE_BUILD)/test_oracle_f32 $(ORACLE_BUILD)/test_oracle_f64 $(ORACLE_BUILD)/oracle_run
-
-$(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o: $(ORACLE_BUILD)/%.o: $(ORACLE_DIR)/%.cpp
+$(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o: $(ORACLE_BUILD)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
 	@mkdir -p $(@D)
-	$(CXX) $(ORACLE_CXXFLAGS) -c $< -o $@
+	$(Q)$(ORACLE_CXX) -c $< -o $@
 
-$(ORACLE_BUILD)/test_oracle_f32.o: $(ORACLE_DIR)/test_oracle.cpp
-	@mkdir -p $(@D)
-	$(CXX) $(ORACLE_CXXFLAGS) -c $< -o $@
-
-$(ORACLE_BUILD)/test_oracle_f64.o: $(ORACLE_DIR)/test_oracle.cpp
-	@mkdir -p $(@D)
-	$(CXX) $(ORACLE_CXXFLAGS) -DHG_REAL_F64=1 -c $< -o $@
-
-$(ORACLE_BUILD)/test_oracle_%: $(ORACLE_BUILD)/test_oracle_%.o $(ORACLE_BUILD)/oracle.o $(BUILD)/lib/libhullguard_%.a
-	$(CXX) $^ -lcmocka -o $@
+# $(call oracle_variant,REAL)
+define oracle_variant
+$(eval $(call objects,$(ORACLE_BUILD)/$(1),$(LIB_SRC),$$(CC_asan) $(REAL_FLAG_$(1))))
+$(eval $(call archive,$(ORACLE_BUILD)/$(1)/libhullguard.a,$(ORACLE_BUILD)/$(1),$(LIB_SRC)))
+$(ORACLE_BUILD)/test_oracle_$(1).o: $(ORACLE)/test_oracle.cpp $(ORACLE)/oracle.mk
+	@mkdir -p $$(@D)
+	$$(Q)$$(ORACLE_CXX) $(REAL_FLAG_$(1)) -c $$< -o $$@
+$(ORACLE_BUILD)/test_oracle_$(1): $(ORACLE_BUILD)/test_oracle_$(1).o $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/$(1)/libhullguard.a
+	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
+endef
+$(foreach r,$(REALS),$(eval $(call oracle_variant,$(r))))
 
 $(ORACLE_BUILD)/oracle_run: $(ORACLE_BUILD)/oracle_run.o $(ORACLE_BUILD)/oracle.o
-	$(CXX) $^ -o $@
-
--include $(wildcard $(ORACLE_BUILD)/*.d)
+	$(Q)$(CXX) -o $@ $^

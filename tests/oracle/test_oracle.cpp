@@ -401,12 +401,20 @@ Tail power_tail(const System &s, int taps)
     return t;
 }
 
+/* Is A = S Lam S^-1 to be trusted? Not when S is nearly singular, and for a double eigenvalue whose imaginary parts vanish in rounding Eigen
+ *  hands out columns that are no eigenvectors at all. */
+bool diagonalisable(const Matrix &A)
+{
+    const Eigen::EigenSolver<Matrix> eigen(A);
+    const Eigen::MatrixXcd           S = eigen.eigenvectors();
+    const Vector singular = Eigen::JacobiSVD<Eigen::MatrixXcd>(S).singularValues();
+    const double residual = (A * S - S * eigen.eigenvalues().asDiagonal()).cwiseAbs().maxCoeff();
+    return singular.minCoeff() > 1e-5 * singular.maxCoeff() && residual <= 1e-12 * (1.0 + A.cwiseAbs().maxCoeff());
+}
+
 Tail tail_of(const System &s, int taps)
 {
-    const Eigen::EigenSolver<Matrix> eigen(s.A);
-    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(eigen.eigenvectors());
-    const double least = svd.singularValues().minCoeff();
-    Tail t = (least > 1e-5 * svd.singularValues().maxCoeff()) ? modal_tail(s, taps) : power_tail(s, taps);
+    Tail t = diagonalisable(s.A) ? modal_tail(s, taps) : power_tail(s, taps);
     /* theta takes the largest of the signals (hull.h), and the hull sums them: every weight must carry the number of signals */
     t.input *= static_cast<double>(s.B.cols());
     return t;
@@ -550,7 +558,7 @@ std::string one_hull(Random &random, HullCount &count)
         const Matrix &bias = (how == HG_START_REST) ? rest : moving;
         const Vector  low  = exact.threshold(y, u) + bias.row(std::min(k, settle - 1)).transpose();
         /* the header's formula: taps exactly, the rest by theta */
-        const double  slack = (tail.decay < 0.999) ? 4.0 * unit * (taps * static_cast<double>(width) + 12.0 + 10.0 / (1.0 - tail.decay)) : 1.0;
+        const double  slack = 4.0 * unit * (taps * static_cast<double>(width) + 12.0 + 3.0 * (k + 1)); /* the decay is widened once a sample */
         for (const hg_real x : radius) { widest = std::max(widest, static_cast<double>(x)); }
         const double noise = 1e-13 * peak * widest; /* the oracle's own rounding, where responses cancel to nothing */
         for (Eigen::Index i = 0; i < r; ++i) {

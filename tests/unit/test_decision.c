@@ -246,17 +246,17 @@ static void all_thirty_two_generators_have_a_bit(void **state)
     uint32_t all_faults[HG_GENERATORS_MAX];
     hg_alarm alarm[HG_GENERATORS_MAX];
     for (uint32_t g = 0U; g < HG_GENERATORS_MAX; g++) {
-        all_faults[g] = 1UL << g;
+        all_faults[g] = (uint32_t)1U << g;
     }
     const hg_decision_config c = {.generators = (uint8_t)HG_GENERATORS_MAX, .feeds = all_feeds, .faults = all_faults, .up = 1U, .down = 1U, .latch = false};
     hg_decision self;
     assert_status(HG_OK, hg_decision_start(&self, &c, alarm));
     for (uint32_t g = 0U; g < HG_GENERATORS_MAX; g++) {
-        const hg_evidence evidence = {.alarm = 1UL << g, .ready = true, .doubt = 0U, .rewound = 0U};
+        const hg_evidence evidence = {.alarm = (uint32_t)1U << g, .ready = true, .doubt = 0U, .rewound = 0U};
         uint32_t candidates = 0U;
         hg_decision_reset(&self);
         assert_int_equal(HG_PLANT_CONFIRMED, hg_decision_step(&self, &evidence, &candidates));
-        assert_true(candidates == (1UL << g));
+        assert_true(candidates == ((uint32_t)1U << g));
     }
 }
 

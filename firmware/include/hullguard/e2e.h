@@ -36,7 +36,7 @@ typedef struct {      /* RAM: one a received message */
 /** What a good frame's header says. */
 typedef struct {
     uint8_t stamp;    /* sample modulo 16 */
-    uint8_t lost;     /* frames lost before this one by the counter, 0 .. 14; 0 for the first frame. 16 lost in a row read as a repetition */
+    uint8_t lost;     /* frames lost before this one by the counter, 0 .. 14; 0 for the first frame. 15 lost in a row read as a repetition */
 } hg_e2e_header;
 
 /** No frame seen yet. */

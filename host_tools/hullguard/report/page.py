@@ -142,12 +142,13 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], caption: str 
     lines = ['<div class="wide"><table>']
     if caption:
         lines.append(f"<caption>{esc(caption)}</caption>")
-    heads = "".join(f'<th{" class=\"n\"" if n else ""}>{esc(h.lstrip("#"))}</th>' for h, n in zip(header, numeric, strict=True))
+    right = ("", ' class="n"')
+    heads = "".join(f"<th{right[n]}>{esc(h.lstrip('#'))}</th>" for h, n in zip(header, numeric, strict=True))
     lines.append(f"<thead><tr>{heads}</tr></thead><tbody>")
     for row in rows:
         cells = []
-        for value, right in zip(row, numeric, strict=True):
-            kinds = ["n"] if right else []
+        for value, is_number in zip(row, numeric, strict=True):
+            kinds = ["n"] if is_number else []
             if isinstance(value, Cell):
                 kinds.append(value.kind)
                 text = value.text

@@ -1,0 +1,443 @@
+/** @file
+ *  A detector ECU on Linux: a model's node (hullguard/node.h) on a CAN interface (hal/socketcan).
+ *
+ *  In lockstep every closing frame is answered with a verdict and no clock is looked at. Otherwise a deadline timer watches the closing
+ *  frames: it is set anew by each one, and a sample whose closing frame is overdue is closed without it. */
+#define _POSIX_C_SOURCE 200809L
+
+#include "models.h"
+#include "socketcan.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define VERSION "0.1.0"
+#define EXIT_FAILED 1
+#define EXIT_INPUT 2
+#define EXIT_BUS 3
+
+#define SECOND_US 1000000U
+#define PERIOD_MAX_MS 3600000.0
+#define MISSES_MAX 4096U           /* entries of the timing file; more are counted only */
+#define BEHIND_MAX 255U            /* overdue samples caught up with; by then every group is stale (hold.h) */
+#define PAUSE_FIRST_US 250U        /* of a send's backoff, doubled each time */
+#define PAUSE_ALL_MAX_US 50000U    /* longest time one frame is offered to a bus that has no room */
+#define FILTERS_MAX HG_GROUPS_MAX
+
+_Static_assert(FILTERS_MAX <= HG_SOCKETCAN_FILTERS_MAX, "a filter for every group");
+
+typedef struct {
+    const app_model *model;
+    const char      *interface;
+    const char      *timing;       /* file name or null */
+    hg_start         how;
+    bool             lockstep;
+    bool             status;
+    uint64_t         period_us;    /* between two closing frames */
+    uint64_t         slack_us;     /* how much later than that a closing frame may be */
+    uint64_t         samples;      /* 0: without end */
+} options;
+
+typedef struct {
+    uint64_t due_us;               /* when the closing frame was overdue */
+    uint64_t noticed_us;           /* when this program saw it */
+    uint32_t k;
+} miss;
+
+typedef struct {
+    options      options;
+    hg_socketcan can;
+    hg_hal       hal;
+    hg_node     *node;
+    hg_verdict   verdict;          /* of the last step */
+    uint64_t     deadline_us;      /* HG_HAL_FOREVER: no closing frame is waited for */
+    uint64_t     status_us;        /* time of the next status line */
+    uint64_t     steps;
+    uint64_t     unsent;           /* frames that found no room or no bus */
+    uint64_t     missed;           /* deadlines since the first closing frame */
+    uint32_t     received;         /* frames at the last status line */
+    bool         ticking;          /* has a closing frame come? */
+} app;
+
+static miss misses[MISSES_MAX];
+
+/* ---- options ---- */
+
+static const char usage[] =
+    "usage: detector_node [options]\n"
+    "  --model NAME       model to run (platoon)\n"
+    "  --interface NAME   CAN interface (vcan0)\n"
+    "  --lockstep         answer every closing frame with a verdict, use no timer\n"
+    "  --rest             the plant starts within its initial range; without it, anywhere in its operating range\n"
+    "  --period MS        time between two closing frames (the model's sample time)\n"
+    "  --deadline MS      how much later a closing frame may be before the sample is closed without it (half the period)\n"
+    "  --samples N        stop after N samples (0: never)\n"
+    "  --status           print a line of status every second\n"
+    "  --timing FILE      when done, write the missed deadlines to FILE\n"
+    "  --help, --version\n"
+    "Prints 'ready' when it listens. SIGINT and SIGTERM end it. Exit status: 0 done, 1 failed, 2 bad option, 3 the bus cannot be opened.\n";
+
+static const char *real_name(void)
+{
+    return (sizeof(hg_real) == sizeof(float)) ? "f32" : "f64";
+}
+
+static int refuse(const char *what, const char *value, const char *cure)
+{
+    (void)fprintf(stderr, "detector_node: %s '%s': %s\n", what, value, cure);
+    return EXIT_INPUT;
+}
+
+static int refuse_model(const char *name)
+{
+    (void)fprintf(stderr, "detector_node: --model '%s': not compiled in; choose one of:", name);
+    for (size_t i = 0U; app_model_at(i) != NULL; i++) {
+        (void)fprintf(stderr, " %s", app_model_at(i)->name);
+    }
+    (void)fprintf(stderr, "\n");
+    return EXIT_INPUT;
+}
+
+/* Milliseconds, fractions allowed, as microseconds; false when it is no such number. */
+static bool read_ms(const char *text, double least, uint64_t *us)
+{
+    char *end = NULL;
+    const double ms = strtod(text, &end);
+    const bool good = (end != text) && (*end == '\0') && (ms >= least) && (ms <= PERIOD_MAX_MS);
+    *us = good ? (uint64_t)((ms * 1000.0) + 0.5) : 0U;
+    return good;
+}
+
+static bool read_count(const char *text, uint64_t *count)
+{
+    char *end = NULL;
+    errno = 0;
+    *count = strtoull(text, &end, 10);
+    return (text[0] >= '0') && (text[0] <= '9') && (*end == '\0') && (errno == 0);
+}
+
+enum {
+    OPTION_MODEL = 256, /* above every character: there are no short options */
+    OPTION_INTERFACE,
+    OPTION_LOCKSTEP,
+    OPTION_REST,
+    OPTION_PERIOD,
+    OPTION_DEADLINE,
+    OPTION_SAMPLES,
+    OPTION_STATUS,
+    OPTION_TIMING,
+    OPTION_HELP,
+    OPTION_VERSION
+};
+
+/* -1: go on; else the exit status. */
+static int take_option(options *self, int option, const char *value)
+{
+    switch (option) {
+    case OPTION_MODEL:
+        self->model = app_model_find(value);
+        return (self->model != NULL) ? -1 : refuse_model(value);
+    case OPTION_INTERFACE:
+        self->interface = value;
+        return -1;
+    case OPTION_LOCKSTEP:
+        self->lockstep = true;
+        return -1;
+    case OPTION_REST:
+        self->how = HG_START_REST;
+        return -1;
+    case OPTION_PERIOD:
+        return read_ms(value, 0.001, &self->period_us) ? -1 : refuse("--period", value, "milliseconds, 0.001 .. 3600000");
+    case OPTION_DEADLINE:
+        return read_ms(value, 0.0, &self->slack_us) ? -1 : refuse("--deadline", value, "milliseconds, 0 .. 3600000");
+    case OPTION_SAMPLES:
+        return read_count(value, &self->samples) ? -1 : refuse("--samples", value, "a whole number, 0 for no end");
+    case OPTION_STATUS:
+        self->status = true;
+        return -1;
+    case OPTION_TIMING:
+        self->timing = value;
+        return -1;
+    case OPTION_HELP:
+        (void)fputs(usage, stdout);
+        return EXIT_SUCCESS;
+    case OPTION_VERSION:
+        (void)printf("detector_node %s (%s)\n", VERSION, real_name());
+        return EXIT_SUCCESS;
+    default:
+        (void)fprintf(stderr, "detector_node: see detector_node --help\n"); /* getopt has named the option */
+        return EXIT_INPUT;
+    }
+}
+
+static int read_options(options *self, int argc, char **argv)
+{
+    static const struct option known[] = {
+        {"model", required_argument, NULL, OPTION_MODEL},       {"interface", required_argument, NULL, OPTION_INTERFACE},
+        {"lockstep", no_argument, NULL, OPTION_LOCKSTEP},       {"rest", no_argument, NULL, OPTION_REST},
+        {"period", required_argument, NULL, OPTION_PERIOD},     {"deadline", required_argument, NULL, OPTION_DEADLINE},
+        {"samples", required_argument, NULL, OPTION_SAMPLES},   {"status", no_argument, NULL, OPTION_STATUS},
+        {"timing", required_argument, NULL, OPTION_TIMING},     {"help", no_argument, NULL, OPTION_HELP},
+        {"version", no_argument, NULL, OPTION_VERSION},         {NULL, 0, NULL, 0},
+    };
+    *self = (options){.model = app_model_at(0U), .interface = "vcan0", .how = HG_START_MOVING, .slack_us = UINT64_MAX};
+    int result = -1;
+    int option = getopt_long(argc, argv, "", known, NULL);
+    while ((result == -1) && (option != -1)) {
+        result = take_option(self, option, optarg);
+        option = (result == -1) ? getopt_long(argc, argv, "", known, NULL) : -1;
+    }
+    if ((result == -1) && (optind < argc)) {
+        result = refuse("argument", argv[optind], "not expected; see detector_node --help");
+    }
+    self->period_us = ((self->period_us == 0U) && (result == -1)) ? self->model->sample_time_us : self->period_us;
+    self->slack_us = (self->slack_us == UINT64_MAX) ? (self->period_us / 2U) : self->slack_us;
+    return result;
+}
+
+/* ---- bus ---- */
+
+static int refuse_bus(const app *self, hg_status status)
+{
+    const char *name = self->options.interface;
+    const int number = self->can.error_number;
+    if (status == HG_E_ARGUMENT) {
+        return refuse("--interface", name, "an interface's name has 1 .. 15 characters");
+    }
+    if (status == HG_E_BUS) {
+        (void)fprintf(stderr, "detector_node: no CAN interface '%s': name one with --interface, or make it: "
+                              "ip link add %s type vcan && ip link set %s up\n", name, name, name);
+    } else if (number == EAFNOSUPPORT) {
+        (void)fprintf(stderr, "detector_node: this kernel has no CAN (%s: %s): load can_raw, or run under with-vcan\n",
+                      self->can.error_call, strerror(number));
+    } else {
+        (void)fprintf(stderr, "detector_node: CAN interface '%s' cannot be opened (%s: %s): check the user's rights and limits\n",
+                      name, self->can.error_call, strerror(number));
+    }
+    return EXIT_BUS;
+}
+
+/* Only the groups' frames are of interest: the kernel drops all others. */
+static hg_status open_bus(app *self)
+{
+    hg_hal_filter filter[FILTERS_MAX];
+    const hg_node_config *config = self->options.model->config;
+    for (uint8_t i = 0U; i < config->detector->groups; i++) {
+        filter[i] = (hg_hal_filter){.id = config->message[i].id, .mask = HG_CAN_ID_EXTENDED,
+                                    .flags = config->message[i].flags & HG_CAN_EXTENDED};
+    }
+    const hg_socketcan_options wanted = {.filters = filter, .filter_count = config->detector->groups, .stop_on_signal = true};
+    const hg_status status = hg_socketcan_open(&self->can, self->options.interface, &wanted);
+    if (status == HG_OK) {
+        self->hal = hg_socketcan_hal(&self->can);
+    }
+    return status;
+}
+
+static void pause_us(uint64_t us)
+{
+    const struct timespec time = {.tv_sec = (time_t)(us / SECOND_US), .tv_nsec = (long)(us % SECOND_US) * 1000L};
+    (void)nanosleep(&time, NULL); /* a signal may cut it short: the next try comes sooner */
+}
+
+/* A frame is offered for a quarter of a period at most: the next sample must not wait for this one's verdict. */
+static void send_frame(app *self, const hg_can_frame *frame)
+{
+    uint64_t left_us = self->options.period_us / 4U;
+    left_us = ((left_us > PAUSE_ALL_MAX_US) || self->options.lockstep) ? PAUSE_ALL_MAX_US : left_us;
+    uint64_t next_us = PAUSE_FIRST_US;
+    hg_status status = hg_hal_send(&self->hal, frame);
+    while ((status == HG_E_BUSY) && (next_us <= left_us)) {
+        pause_us(next_us);
+        left_us -= next_us;
+        next_us *= 2U;
+        status = hg_hal_send(&self->hal, frame);
+    }
+    self->unsent += (status == HG_OK) ? 0U : 1U; /* the heartbeat says it again */
+}
+
+/* ---- node ---- */
+
+static bool finished(const app *self)
+{
+    return (self->options.samples > 0U) && (self->steps >= self->options.samples);
+}
+
+static void make_steps(app *self)
+{
+    hg_can_frame frame[2];
+    while ((!finished(self)) && (hg_node_step(self->node, &self->verdict) == HG_OK)) {
+        const bool reply = self->options.lockstep && (self->node->due == 0U);
+        const uint8_t frames = hg_node_report(self->node, &self->verdict, reply, frame);
+        for (uint8_t i = 0U; i < frames; i++) {
+            send_frame(self, &frame[i]);
+        }
+        self->steps++;
+    }
+}
+
+static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
+{
+    hg_status status = hg_node_receive(self->node, frame);
+    if (status == HG_E_BUSY) {
+        make_steps(self);
+        status = hg_node_receive(self->node, frame);
+    }
+    if ((status == HG_OK) && (self->node->due > 0U)) { /* it was the closing frame: the next one is expected a period later */
+        self->ticking = true;
+        self->deadline_us = self->options.lockstep ? HG_HAL_FOREVER : (at_us + self->options.period_us + self->options.slack_us);
+    }
+    make_steps(self);
+}
+
+/* Sample by sample, frames first: what has arrived in time is never overtaken by the timer. */
+static void look_at_deadline(app *self)
+{
+    const uint64_t now_us = hg_hal_now_us(&self->hal);
+    if (now_us < self->deadline_us) {
+        return;
+    }
+    if (self->ticking) {
+        if (self->missed < MISSES_MAX) {
+            misses[self->missed] = (miss){.due_us = self->deadline_us, .noticed_us = now_us, .k = self->node->k};
+        }
+        self->missed++;
+    }
+    hg_node_overdue(self->node);
+    make_steps(self);
+    const uint64_t behind_us = now_us - self->deadline_us;
+    self->deadline_us += self->options.period_us;
+    if (behind_us > (BEHIND_MAX * self->options.period_us)) { /* this process was stopped for long */
+        self->deadline_us = now_us + self->options.period_us;
+    }
+}
+
+/* ---- what is told ---- */
+
+static void print_status(app *self)
+{
+    static const char *const plant[] = {"starting", "none", "provisional", "confirmed"};
+    static const char *const bus[] = {"absent", "good", "lossy", "stale"};
+    static const char *const can[] = {"unknown", "active", "warning", "passive", "off"};
+    const hg_node_config *config = self->options.model->config;
+    hg_hal_report report;
+    hg_hal_state(&self->hal, &report);
+    (void)printf("k=%" PRIu32 " plant=%s candidates=0x%" PRIX32, self->verdict.k, plant[self->verdict.plant], self->verdict.candidates);
+    for (uint8_t i = 0U; i < config->detector->groups; i++) {
+        const hg_link_health *health = hg_node_health(self->node, i);
+        const unsigned refused = (unsigned)health->crc + health->format + health->repeated + health->early + health->late + health->numeric;
+        (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", self->options.model->group[i], bus[(self->verdict.bus >> (2U * i)) & 0x3U],
+                     (unsigned)health->good, (unsigned)health->lost, refused);
+    }
+    (void)printf(" frames_per_s=%" PRIu32 " missed=%" PRIu64 " unsent=%" PRIu64 " can=%s errors=%" PRIu32 " dropped=%" PRIu32
+                 " malformed=%" PRIu32 "\n", report.received - self->received, self->missed, self->unsent, can[report.bus], report.errors,
+                 report.lost, report.malformed);
+    (void)fflush(stdout);
+    self->received = report.received;
+}
+
+static bool write_timing(const app *self)
+{
+    if (self->options.timing == NULL) {
+        return true;
+    }
+    FILE *file = fopen(self->options.timing, "w");
+    if (file == NULL) {
+        (void)fprintf(stderr, "detector_node: --timing '%s': %s; name a file that can be written\n", self->options.timing, strerror(errno));
+        return false;
+    }
+    (void)fprintf(file, "# samples %" PRIu64 " missed %" PRIu64 "\n# k due_us noticed_us (CLOCK_MONOTONIC)\n", self->steps, self->missed);
+    for (uint64_t i = 0U; (i < self->missed) && (i < MISSES_MAX); i++) {
+        (void)fprintf(file, "%" PRIu32 " %" PRIu64 " %" PRIu64 "\n", misses[i].k, misses[i].due_us, misses[i].noticed_us);
+    }
+    const bool good = ferror(file) == 0;
+    return (fclose(file) == 0) && good;
+}
+
+/* ---- the loop ---- */
+
+static uint64_t wake_time(const app *self)
+{
+    return (self->options.status && (self->status_us < self->deadline_us)) ? self->status_us : self->deadline_us;
+}
+
+static int run(app *self)
+{
+    hg_can_frame frame;
+    uint64_t at_us;
+    while (!finished(self)) {
+        if (hg_hal_wait(&self->hal, wake_time(self)) == HG_E_IO) {
+            return EXIT_SUCCESS; /* asked to stop */
+        }
+        hg_status status = HG_OK;
+        while ((!finished(self)) && (status == HG_OK)) {
+            status = hg_hal_receive(&self->hal, &frame, &at_us);
+            if (status == HG_OK) {
+                take_frame(self, &frame, at_us);
+            }
+        }
+        if (status == HG_E_IO) {
+            (void)fprintf(stderr, "detector_node: CAN interface '%s' failed (%s: %s): start again when it is back\n",
+                          self->options.interface, self->can.error_call, strerror(self->can.error_number));
+            return EXIT_BUS;
+        }
+        if (!finished(self)) {
+            look_at_deadline(self);
+        }
+        if (self->options.status && (hg_hal_now_us(&self->hal) >= self->status_us)) {
+            print_status(self);
+            self->status_us += SECOND_US;
+        }
+    }
+    return EXIT_SUCCESS;
+}
+
+static int start(app *self)
+{
+    const hg_status opened = open_bus(self);
+    if (opened != HG_OK) {
+        return refuse_bus(self, opened);
+    }
+    const hg_status started = app_model_start(self->options.model, &self->node, self->options.how);
+    if (started != HG_OK) {
+        (void)fprintf(stderr, "detector_node: model '%s' does not start (status %d): generate its tables again\n",
+                      self->options.model->name, (int)started);
+        return EXIT_FAILED;
+    }
+    const uint64_t now_us = hg_hal_now_us(&self->hal);
+    /* A start at rest waits for sample 0 as long as it takes; in a moving plant a bus that stays silent has to be reported. */
+    const bool waits = self->options.lockstep || (self->options.how == HG_START_REST);
+    self->deadline_us = waits ? HG_HAL_FOREVER : (now_us + self->options.period_us + self->options.slack_us);
+    self->status_us = now_us + SECOND_US;
+    (void)puts("ready");
+    (void)fflush(stdout);
+    return -1;
+}
+
+int main(int argc, char **argv)
+{
+    static app self;
+    int result = read_options(&self.options, argc, argv);
+    if (result != -1) {
+        return result;
+    }
+    (void)signal(SIGPIPE, SIG_IGN); /* a reader of the status lines that goes away must not end the node */
+    result = start(&self);
+    if (result == -1) {
+        result = run(&self);
+        if (self.options.status) {
+            print_status(&self);
+        }
+        if ((!write_timing(&self)) && (result == EXIT_SUCCESS)) {
+            result = EXIT_FAILED;
+        }
+    }
+    hg_socketcan_close(&self.can);
+    return result;
+}

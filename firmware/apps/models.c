@@ -1,0 +1,40 @@
+#include "models.h"
+
+#include "platoon.h"
+
+#include <string.h>
+
+/* One line a model: its name as its generated header writes it, in lower and in upper case. */
+#define MODELS(X) X(platoon, PLATOON)
+
+#define STORAGE(name, NAME)                                                     \
+    static hg_##name##_node name##_node;                                        \
+    static const char *const name##_group[] = HG_##NAME##_GROUP_NAMES;          \
+    static hg_status name##_start(hg_node **node, hg_start how)                 \
+    {                                                                           \
+        *node = &name##_node.node;                                              \
+        return hg_##name##_node_start(&name##_node, how);                       \
+    }
+MODELS(STORAGE)
+
+#define ENTRY(name, NAME) {#name, &hg_##name##_config, name##_group, HG_##NAME##_SAMPLE_TIME_US, name##_start},
+static const app_model models[] = {MODELS(ENTRY)};
+
+const app_model *app_model_at(size_t index)
+{
+    return (index < (sizeof models / sizeof models[0])) ? &models[index] : NULL;
+}
+
+const app_model *app_model_find(const char *name)
+{
+    size_t i = 0U;
+    while ((app_model_at(i) != NULL) && (strcmp(app_model_at(i)->name, name) != 0)) {
+        i++;
+    }
+    return app_model_at(i);
+}
+
+hg_status app_model_start(const app_model *model, hg_node **node, hg_start how)
+{
+    return model->start(node, how);
+}

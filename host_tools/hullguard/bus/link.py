@@ -1,0 +1,94 @@
+"""Frames to and from a real bus through python-can, with what python-can leaves out: full send queues, and errors in one line."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import socket
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import can
+
+from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE
+from hullguard.core.native import Frame
+from hullguard.errors import BusError
+
+RECEIVE_BUFFER = 4 << 20  # bytes; python-can's default holds 278 frames
+SEND_PATIENCE_S = 1.0
+
+
+def to_message(frame: Frame) -> can.Message:
+    """A frame as python-can has it."""
+    return can.Message(
+        arbitration_id=frame.id,
+        data=frame.data,
+        is_extended_id=bool(frame.flags & EXTENDED),
+        is_remote_frame=bool(frame.flags & REMOTE),
+        is_fd=bool(frame.flags & FD),
+        bitrate_switch=bool(frame.flags & BRS),
+    )
+
+
+def from_message(message: can.Message) -> Frame:
+    """A python-can message as a frame."""
+    flags = EXTENDED if message.is_extended_id and not message.is_error_frame else 0
+    flags |= REMOTE if message.is_remote_frame else 0
+    flags |= (FD if message.is_fd else 0) | (BRS if message.bitrate_switch else 0) | (ERROR if message.is_error_frame else 0)
+    return Frame(message.arbitration_id, flags, bytes(message.data))
+
+
+class CanLink:
+    """An open bus."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self.bus = bus
+        self.channel = str(getattr(bus, "channel", "can0"))
+        raw = getattr(bus, "socket", None)
+        if isinstance(raw, socket.socket):
+            with contextlib.suppress(OSError):
+                raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+
+    def send(self, frame: Frame) -> None:
+        """Send one frame; a full queue is waited for, a dead bus is an error."""
+        end = time.monotonic() + SEND_PATIENCE_S
+        while True:
+            try:
+                self.bus.send(to_message(frame))
+                return
+            except can.CanOperationError as error:
+                full = getattr(error, "error_code", None) == errno.ENOBUFS
+                if not full or time.monotonic() > end:
+                    cure = "raise its txqueuelen" if full else "is the interface up?"
+                    raise BusError(f"cannot send on {self.channel}: {error}; {cure}") from error
+                time.sleep(0.0005)
+
+    def receive(self, timeout_s: float) -> tuple[Frame, float] | None:
+        """The next frame and its time stamp, or None when none comes in time."""
+        try:
+            message = self.bus.recv(timeout_s)
+        except can.CanError as error:
+            raise BusError(f"cannot receive on {self.channel}: {error}; is the interface up?") from error
+        return None if message is None else (from_message(message), message.timestamp)
+
+    def close(self) -> None:
+        """Let the bus go."""
+        with contextlib.suppress(can.CanError, OSError):
+            self.bus.shutdown()
+
+
+@contextlib.contextmanager
+def opened(**options: Any) -> Iterator[CanLink]:
+    """Open a bus with python-can's own options; closed on the way out. Raises BusError with the cause and the cure."""
+    name = f"{options.get('interface') or 'the configured interface'}:{options.get('channel')}"
+    try:
+        bus = can.Bus(**options)
+    except (can.CanError, can.CanInterfaceNotImplementedError, OSError, ValueError, ImportError, TypeError) as error:
+        cure = "create it with: ip link add dev vcan0 type vcan && ip link set vcan0 up" if options.get("interface") == "socketcan" else "check -i, -c and its driver"
+        raise BusError(f"bus {name} cannot be opened: {error}; {cure}") from error
+    link = CanLink(bus)
+    try:
+        yield link
+    finally:
+        link.close()

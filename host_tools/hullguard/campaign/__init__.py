@@ -1,0 +1,1 @@
+"""Many runs: false alarms, delays, losses."""

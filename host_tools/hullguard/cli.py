@@ -1,0 +1,171 @@
+"""The hullguard command."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+
+from hullguard import __version__
+from hullguard.errors import HullguardError
+
+EPILOG = """a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
+  NAME a signal or a fault of the model; KIND bias, drift (units a second), gain, freeze or noise; START and END sample indices
+
+exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened
+"""
+
+
+def _common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("model", metavar="MODEL", help="name of a shipped model, or path of a model file")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the model, e.g. groups.measurement.trigger.silence=1")
+    parser.add_argument("--real", choices=["f32", "f64"], default="f32", help="number type of the C library (default f32)")
+    _output(parser)
+
+
+def _output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout, everything else on stderr")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no lines for people")
+
+
+def _faults(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--fault", action="append", default=[], metavar="SPEC", help="a fault, instead of the scenario's; may be given more than once")
+    parser.add_argument("--no-fault", action="store_true", help="none of the scenario's faults")
+
+
+def _scenario(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scenario", metavar="NAME", help="scenario of the model (default: its first)")
+
+
+def _length(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--samples", type=_positive, metavar="N", help="number of samples")
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="seed of every random number (default 1)")
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is not at least 1")
+    return value
+
+
+def _bus(parser: argparse.ArgumentParser) -> None:
+    from can.cli import add_bus_arguments
+
+    add_bus_arguments(parser, group_title="bus options of python-can")
+
+
+def _expect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--expect", choices=["detect", "quiet"], help="exit with status 1 unless every fault was found without a false alarm, or unless there was no alarm")
+
+
+def _drive(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--bus", default="auto", metavar="BUS", help="auto (default): an existing vcan, else one that is made for the run, else none; inprocess: none; or the name of a SocketCAN interface")
+    parser.add_argument("--speed", default="max", metavar="X", help="max (default): in lockstep, as fast as the node answers; or a multiple of real time")
+    parser.add_argument("--out", metavar="DIR", help="write run.log, run.json, signals.csv, labels.csv, the DBC and report.html there")
+    _expect(parser)
+    _bus(parser)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """All options of all subcommands."""
+    parser = argparse.ArgumentParser(
+        prog="hullguard", description="Event-triggered, set-based fault detection on ECUs over CAN.", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--version", action="version", version=f"hullguard {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def add(name: str, text: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)
+
+    p = add("design", "check a model, find its detector, and write C tables, DBC and design report")
+    _common(p)
+    p.add_argument("--out", metavar="DIR", help="folder for tables, DBC and report (default build/NAME)")
+    p.add_argument("--fresh", action="store_true", help="search again even if NAME.design.toml fits the model")
+
+    p = add("run", "run a model: emulated plant, triggers, bus, detector node")
+    _common(p)
+    _scenario(p)
+    _length(p)
+    _faults(p)
+    _drive(p)
+
+    p = add("replay", "recorded signals through triggers, bus and detector")
+    _common(p)
+    p.add_argument("--csv", required=True, metavar="FILE", help="recording; its columns carry the model's signal names")
+    p.add_argument("--noise", action="store_true", help="add the sensor noise that the model states, uniform and seeded")
+    _length(p)
+    _faults(p)
+    _drive(p)
+
+    p = add("detect", "the detector on any python-can interface, or on a candump log")
+    _common(p)
+    _scenario(p)
+    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus")
+    p.add_argument("--lockstep", action="store_true", help="answer every closing frame with a verdict; no deadline")
+    p.add_argument("--rest", action="store_true", help="the plant starts within its initial range (default: anywhere in its range)")
+    p.add_argument("--listen", action="store_true", help="send nothing")
+    p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
+    p.add_argument("--ready", action="store_true", help="print 'ready' once the bus is open")
+    _expect(p)
+    _bus(p)
+
+    p = add("plant", "the emulated plant and its senders alone, on a bus with a node of your own")
+    _common(p)
+    _scenario(p)
+    _length(p)
+    _faults(p)
+    p.add_argument("--lockstep", action="store_true", help="wait for the node's verdict after every closing frame and compare it")
+    p.add_argument("--speed", default="1", metavar="X", help="multiple of real time (default 1)")
+    _bus(p)
+
+    p = add("campaign", "many runs with different seeds, in C, on all cores")
+    _common(p)
+    _scenario(p)
+    _length(p)
+    _faults(p)
+    p.add_argument("--runs", type=int, default=100, metavar="N", help="number of runs (default 100)")
+    p.add_argument("--loss", type=float, default=0.0, metavar="P", help="probability that a measurement frame is lost at the receiver")
+    p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
+    p.add_argument("--out", metavar="DIR", help="write campaign.json there")
+    _expect(p)
+
+    p = add("report", "draw report.html from the files of a run")
+    p.add_argument("directory", metavar="DIR", help="the --out folder of a run")
+    _output(p)
+    return parser
+
+
+def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
+    from hullguard import commands
+
+    return {
+        "design": commands.run_design,
+        "run": commands.run_run,
+        "replay": commands.run_replay,
+        "detect": commands.run_detect,
+        "plant": commands.run_plant,
+        "campaign": commands.run_campaign,
+        "report": commands.run_report,
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; its exit status. Errors are one line on stderr that names the cause and the cure."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    args = build_parser().parse_args(given)
+    args.arguments = given
+    try:
+        return _commands()[args.command](args)
+    except HullguardError as error:
+        print(f"hullguard: {error}", file=sys.stderr)
+        return error.status
+    except KeyboardInterrupt:
+        print("hullguard: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,28 @@
+"""Files made from a design: C tables for the ECU and a DBC for every other CAN tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hullguard.codegen.c import emit_c
+from hullguard.codegen.dbc import emit_dbc
+from hullguard.design.design import Design
+
+__all__ = ["emit_c", "emit_dbc", "write_all"]
+
+
+def write_all(design: Design, out_dir: Path) -> tuple[Path, ...]:
+    """Write NAME.h, NAME.c and NAME.dbc; a file that already holds the same bytes is left alone, so that nothing is rebuilt for it.
+
+    Returns the files that changed.
+    """
+    name = design.tables.name
+    header, source = emit_c(design)
+    changed = []
+    out_dir.mkdir(parents=True, exist_ok=True)
+    for suffix, text in ((".h", header), (".c", source), (".dbc", emit_dbc(design))):
+        path, data = out_dir / (name + suffix), text.encode("ascii")
+        if not path.is_file() or path.read_bytes() != data:
+            path.write_bytes(data)
+            changed.append(path)
+    return tuple(changed)

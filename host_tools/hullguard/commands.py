@@ -1,0 +1,493 @@
+"""What each subcommand does, between the options (cli.py) and the modules that do the work."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from hullguard.bus import candump, choose
+from hullguard.bus.link import opened
+from hullguard.campaign.campaign import Job, campaign, digest
+from hullguard.core.library import library
+from hullguard.core.native import MOVING, REST, Native, Plant, Recording, Verdict
+from hullguard.design import store
+from hullguard.design.design import Design, design, finish, stored_for
+from hullguard.errors import BusError, ExpectationError, InputError
+from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_override
+from hullguard.plant.detect import Detector, from_bus, from_log
+from hullguard.plant.recording import read_recording
+from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, summary, write_files
+
+INSIDE = "HULLGUARD_INSIDE"  # set for the copy of a command that runs where with-vcan made a bus
+NODE_START_S = 20.0
+
+
+def say(args: argparse.Namespace, text: str) -> None:
+    """A line for people: on stdout, or on stderr when stdout carries JSON."""
+    if not args.quiet:
+        print(text, file=sys.stderr if args.json else sys.stdout, flush=True)
+
+
+def prepared(args: argparse.Namespace) -> tuple[Model, Design]:
+    """The model with its overrides and scenario, and its design."""
+    overrides = dict(parse_override(text) for text in args.set)
+    model = load_model(args.model, overrides, getattr(args, "scenario", None))
+    with progress(args, f"designing {model.name}") as tick:
+        made, own = design(model, fresh=False, tick=tick)
+    if not own and not overrides and not store.path_of(model.path).exists():
+        _keep_design(args, model, made)
+    return made.model, made
+
+
+def _keep_design(args: argparse.Namespace, model: Model, made: Design) -> None:
+    """A search is worth keeping beside the model, where that can be written."""
+    path = store.path_of(model.path)
+    with contextlib.suppress(OSError):
+        store.write(path, model.path.stem, made.stored)
+        say(args, f"design kept in {path.name}")
+
+
+@contextlib.contextmanager
+def progress(args: argparse.Namespace, title: str) -> Iterator[Callable[[str, int, int], None]]:
+    """A progress bar on stderr for long work; silent where stderr is no terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal or args.quiet:
+        yield lambda what, step, total: None
+        return
+    with Progress(TextColumn(title), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console, transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def tick(what: str, step: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bars.add_task(what, total=total)
+            bars.update(tasks[what], completed=step)
+
+        yield tick
+
+
+def emit(args: argparse.Namespace, result: dict[str, Any]) -> None:
+    """The JSON object, when asked for."""
+    if args.json:
+        print(json.dumps(result), flush=True)
+
+
+# ---- design ----
+
+
+def matrices(made: Design) -> list[dict[str, Any]]:
+    """Matrices of every generator by the names of the method note."""
+    rows = []
+    for g in made.generators:
+        named = {
+            "A": g.plant.A, "B": g.plant.B, "C": g.plant.C, "D": g.plant.D, "Ed": g.plant.Ed, "Fd": g.plant.Fd,
+            "T": g.observer.T, "G": g.observer.G, "H": g.observer.H, "L": g.observer.L, "W": g.observer.W, "V": g.observer.V, "Qu": g.observer.Qu,
+            "Lo": g.filter.Lo, "Mo": g.filter.Mo,
+        }  # fmt: skip
+        row: dict[str, Any] = {name: value.tolist() for name, value in named.items()}
+        row["poles"] = [[float(p.real), float(p.imag)] for p in np.linalg.eigvals(g.observer.G)]
+        row["outputs"] = [made.model.signals[made.model.outputs[i]].name for i in g.spec.outputs]
+        row["inputs"] = [made.model.signals[made.model.inputs[i]].name for i in g.spec.inputs]
+        row["smallest_fault"] = _by_fault(made, g.spec.faults, g.smallest)
+        row["smallest_fault_without_trigger_aware_filter"] = _by_fault(made, g.spec.faults, g.blind)
+        row["regularised"] = g.filter.regularised
+        row["rounding"] = g.tables.rounding.tolist()
+        row["threshold_steady"] = g.tables.steady.tolist()
+        row["ready_samples"] = {"rest": g.tables.ready_rest, "moving": g.tables.ready_moving}
+        rows.append(row)
+    return rows
+
+
+def _by_fault(made: Design, faults: Sequence[int], values: Any) -> dict[str, float | None]:
+    return {made.model.faults[f].name: (float(v) if np.isfinite(v) else None) for f, v in zip(faults, values, strict=True)}
+
+
+def run_design(args: argparse.Namespace) -> int:
+    """hullguard design."""
+    from hullguard.codegen import write_all
+    from hullguard.report.design_report import write_design_report
+
+    overrides = dict(parse_override(text) for text in args.set)
+    model = load_model(args.model, overrides)
+    with progress(args, f"designing {model.name}") as tick:
+        stored, own = stored_for(model, args.fresh, tick)
+    made = finish(model, stored)
+    out = Path(args.out) if args.out else Path("build") / model.name
+    out.mkdir(parents=True, exist_ok=True)
+    beside = store.path_of(model.path)
+    if not own and not overrides:
+        try:
+            store.write(beside, model.path.stem, stored)
+        except OSError as error:
+            raise InputError(f"{beside}: cannot be written ({error.strerror}); copy the model to a folder of your own") from error
+    elif overrides:
+        store.write(out / f"{model.path.stem}.design.toml", model.path.stem, stored)
+    write_all(made, out)
+    report = out / f"{model.name}.html"
+    write_design_report(made, report)
+    for c in made.checks:
+        say(args, f"  {c.name}: {c.value:.4g} (limit {c.limit:.4g})")
+    for i, g in enumerate(made.generators):
+        found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
+        say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
+    say(args, f"model {model.name}, hash {made.tables.hash:08x}: tables, DBC and report in {out}" + ("" if own else f"; search kept in {beside.name}" if not overrides else ""))
+    emit(args, {
+        "model": model.name, "model_hash": f"{made.tables.hash:08x}", "out": str(out), "generators": matrices(made),
+        "slews": {s.name: stored.slew[i].tolist() for i, s in enumerate(model.signals)},
+        "state_range": stored.state_range.tolist(),
+        "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "passed": c.passed} for c in made.checks],
+        "load_bound": made.load_bound, "reused": own,
+    })  # fmt: skip
+    return 0
+
+
+# ---- run, replay ----
+
+
+def the_faults(args: argparse.Namespace, model: Model, scenario: Sequence[FaultSpec], samples: int) -> list[FaultSpec]:
+    """Faults of the command line, or else of the scenario; each must exist and start within the run."""
+    faults = [parse_fault(text) for text in args.fault] if args.fault else ([] if args.no_fault else list(scenario))
+    for f in faults:
+        model.signal(f.name)
+        if f.start >= samples:
+            raise InputError(f"fault '{f}': it starts at sample {f.start}, the run has {samples}; use --samples or an earlier start")
+    return faults
+
+
+def run_run(args: argparse.Namespace) -> int:
+    """hullguard run."""
+    if args.seed < 0:
+        raise InputError(f"--seed {args.seed}: expected 0 or more")
+    model, made = prepared(args)
+    scenario = model.scenario(args.scenario)
+    samples = args.samples or scenario.samples
+    faults = the_faults(args, model, scenario.faults, samples)
+    native = Native(library(args.real), made.tables)
+    source = Plant(native, made, scenario.reference, faults, args.seed)
+    return _drive(args, made, native, source, samples, faults, scenario.name)
+
+
+def run_replay(args: argparse.Namespace) -> int:
+    """hullguard replay."""
+    model, made = prepared(args)
+    series = read_recording(Path(args.csv), model)
+    samples = min(args.samples or len(series), len(series))
+    faults = the_faults(args, model, (), samples)
+    native = Native(library(args.real), made.tables)
+    source = Recording(native, model, series, args.noise, faults, args.seed)
+    return _drive(args, made, native, source, samples, faults, Path(args.csv).name)
+
+
+def _drive(args: argparse.Namespace, made: Design, native: Native, source: Source, samples: int, faults: list[FaultSpec], scenario: str) -> int:
+    """Find the bus, run, write what was asked for, judge."""
+    options = bus_options(args)
+    if not options and args.bus == "auto" and choose.existing_vcan() is None and choose.launcher() is not None and INSIDE not in os.environ:
+        return _drive_inside(args)
+    out = Path(args.out) if args.out else None
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    with _bus(args, made, native, options) as (bus, pace, name):
+        say(args, f"bus: {name}")
+        log = candump.Writer(out / "run.log", name.split()[0] if not isinstance(bus, InProcess) else "vcan0") if out else None
+        try:
+            trace, mismatch = _loop(args, made, native, source, samples, bus, pace, log)
+        finally:
+            if log is not None:
+                log.close()
+    facts = {"bus": name, "seed": args.seed, "scenario": scenario}
+    result = summary(made, native, trace, faults, facts)
+    if out is not None:
+        write_files(out, made, native, trace, faults, result)
+        from hullguard.codegen import write_dbc
+
+        write_dbc(made, out)
+        if INSIDE not in os.environ:
+            _report(args, out)
+    _tell(args, result)
+    emit(args, result)
+    if mismatch:
+        raise ExpectationError(f"the node's verdicts differ from this process's: {mismatch}")
+    return _expected(args, result)
+
+
+def _drive_inside(args: argparse.Namespace) -> int:
+    """The same command once more where with-vcan makes a bus; the report is drawn out here, where there is more processor."""
+    os.environ[INSIDE] = "1"
+    status = choose.inside(args.arguments)
+    del os.environ[INSIDE]
+    if args.out and (Path(args.out) / "run.json").is_file() and status in (0, 1):
+        _report(args, Path(args.out))
+    return status
+
+
+def _report(args: argparse.Namespace, out: Path) -> None:
+    from hullguard.report.run_report import write_run_report
+
+    say(args, f"report: {write_run_report(out)}")
+
+
+def _loop(
+    args: argparse.Namespace, made: Design, native: Native, source: Source, samples: int, bus: Bus, pace: Pace, log: candump.Writer | None
+) -> tuple[Trace, str | None]:
+    from hullguard.report.live import LiveTable
+
+    run = Run(made, native, bus, pace, log)
+    if args.json or args.quiet:
+        return run.samples(source, samples), run.mismatch
+    with LiveTable(made, samples) as table:
+
+        def watch(k: int, trace: Trace) -> None:
+            ratios = [abs(r) / J for r, J in zip(trace.r[-1], trace.J[-1], strict=True)]
+            v = trace.verdict[-1]
+            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, dict(zip((g.name for g in native.tables.groups), v.bus, strict=True)), trace.counts["measurement"])
+
+        return run.samples(source, samples, watch), run.mismatch
+
+
+def bus_options(args: argparse.Namespace) -> dict[str, Any]:
+    """python-can's options as they were given; empty when none was."""
+    given = {k: getattr(args, k) for k in ("channel", "interface", "bitrate", "fd", "data_bitrate", "timing") if hasattr(args, k)}
+    return given | (getattr(args, "bus_kwargs", None) or {})
+
+
+@contextlib.contextmanager
+def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any]) -> Iterator[tuple[Bus, Pace, str]]:
+    """The bus of a run, with a detector node at its other end."""
+    pace = Pace(True) if args.speed == "max" else Pace(False, _speed(args.speed))
+    if not options and args.bus == "auto":
+        found = choose.existing_vcan()
+        if found is None and INSIDE in os.environ:
+            raise BusError("with-vcan ended without a vcan; run it by hand with -v to see why, or use --bus inprocess")
+        options = {"interface": "socketcan", "channel": found} if found else {}
+    elif not options and args.bus != "inprocess":
+        options = {"interface": "socketcan", "channel": args.bus}
+    if not options:
+        yield InProcess(), pace, "in process (no CAN bus)"
+        return
+    if options.get("interface") == "virtual":
+        raise BusError("a virtual bus lives inside one process and has no second end; use --bus inprocess")
+    if any(m.flags & candump.FD for m in [g.message for g in native.tables.groups]):
+        options.setdefault("fd", True)
+    with opened(**options) as link, _node(args, made, native, options, pace.lockstep):
+        name = choose.describe(str(options.get("channel"))) if options.get("interface") == "socketcan" else f"{options.get('interface')}:{options.get('channel')}"
+        yield OnCan(link, native, pace), pace, name
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = float("nan")
+    if not 0.0 < speed < 1e6:
+        raise InputError(f"--speed '{text}': expected max, or a number above 0 (1 is real time)")
+    return speed
+
+
+def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any], lockstep: bool) -> list[str]:
+    """The C node where it has this very model compiled in, otherwise the same library behind python-can."""
+    if options.get("interface") == "socketcan" and args.real in ("f32", "f64"):
+        binary = choose.NODE if args.real == "f32" else choose.NODE.with_name("detector_node_f64")
+        if binary.is_file():
+            listed = subprocess.run([str(binary), "--list"], capture_output=True, text=True, check=False).stdout.split("\n")
+            if f"{made.model.name} {made.tables.hash:08x}" in listed:
+                command = [str(binary), "--model", made.model.name, "--interface", str(options["channel"]), "--rest"]
+                return command + (["--lockstep"] if lockstep else [])
+    command = [sys.executable, "-m", "hullguard", "detect", args.model, "--rest", "--quiet", "--ready", "--real", args.real]
+    command += [x for text in args.set for x in ("--set", text)] + (["--scenario", args.scenario] if getattr(args, "scenario", None) else [])
+    for key, value in options.items():
+        if key == "fd":
+            command += ["--fd"] if value else []
+        elif key in ("interface", "channel", "bitrate", "data_bitrate"):
+            command += [f"--{key.replace('_', '-')}", str(value)]
+        else:
+            command += ["--bus-kwargs", f"{key}={value}"]
+    return command + (["--lockstep"] if lockstep else [])
+
+
+@contextlib.contextmanager
+def _node(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any], lockstep: bool) -> Iterator[None]:
+    """A detector node as a process of its own, ready before the first frame and ended after the last."""
+    command = node_command(args, made, options, lockstep)
+    say(args, f"node: {Path(command[0]).name if 'hullguard' not in command else 'hullguard detect'}, a process of its own")
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        assert process.stdout is not None
+        if process.stdout.readline().strip() != "ready":
+            raise BusError(f"the detector node did not start (exit status {process.wait(NODE_START_S)}): {' '.join(command)}")
+        yield
+    finally:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
+    """The result for people."""
+    frames, period = result["frames"], result["sample_time_s"]
+    total, share = frames["bits"], frames["bits"] / max(1, frames["bits_periodic"])
+    say(args, f"{result['samples']} samples, {frames['measurement']} measurement frames, {total} bits on the bus: {100 * share:.1f} % of periodic sending")
+    for f in result["faults"]:
+        began = f"fault {f['spec']}: began at sample {f['start']} ({f['start'] * period:g} s)"
+        if f["detected_at"] is None:
+            say(args, f"{began}, not found")
+        else:
+            sure = "confirmed at once" if f["confirmed_at"] == f["detected_at"] else f"confirmed at {f['confirmed_at']}" if f["confirmed_at"] is not None else "not confirmed"
+            say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}")
+    alarms = result["false_alarms"]
+    say(args, f"false alarms before the fault: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J {result['margin_max']:.3f}")
+
+
+def _expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
+    """--expect."""
+    alarms = result["false_alarms"]
+    if args.expect == "quiet" and (alarms["provisional"] or any(f["detected_at"] is not None for f in result["faults"])):
+        raise ExpectationError("expected a quiet run, but there was an alarm")
+    if args.expect == "detect":
+        if not result["faults"]:
+            raise ExpectationError("expected a detection, but the run has no fault; give --fault")
+        missed = [f["spec"] for f in result["faults"] if f["confirmed_at"] is None]
+        if missed or alarms["provisional"]:
+            raise ExpectationError(f"expected every fault to be found: missed {', '.join(missed) or 'none'}, false alarms {alarms['provisional']}")
+    return 0
+
+
+# ---- plant, detect ----
+
+
+def run_plant(args: argparse.Namespace) -> int:
+    """hullguard plant: the emulator alone."""
+    model, made = prepared(args)
+    scenario = model.scenario(args.scenario)
+    samples = args.samples or scenario.samples
+    faults = the_faults(args, model, scenario.faults, samples)
+    native = Native(library(args.real), made.tables)
+    source = Plant(native, made, scenario.reference, faults, args.seed)
+    options = bus_options(args) or {"interface": "socketcan", "channel": choose.existing_vcan() or "vcan0"}
+    pace = Pace(args.lockstep, _speed(args.speed) if args.speed != "max" else 1e5)
+    with opened(**options) as link:
+        run = Run(made, native, OnCan(link, native, pace), pace)
+        trace = run.samples(source, samples)
+    result = summary(made, native, trace, faults, {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name})
+    _tell(args, result)
+    emit(args, result)
+    if run.mismatch:
+        raise ExpectationError(f"the node's verdicts differ from this process's: {run.mismatch}")
+    return 0
+
+
+def run_detect(args: argparse.Namespace) -> int:
+    """hullguard detect."""
+    _, made = prepared(args)
+    native = Native(library(args.real), made.tables)
+    stopped: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stopped.append(number)
+
+    changes: list[dict[str, Any]] = []
+
+    def watch(v: Verdict) -> None:
+        bus = dict(zip((g.name for g in native.tables.groups), v.bus, strict=True))
+        if not changes or changes[-1]["plant"] != v.plant or changes[-1]["bus"] != bus:
+            changes.append({"k": v.k, "plant": v.plant, "bus": bus})
+            names = [x.name for i, x in enumerate(made.model.faults) if v.candidates >> i & 1]
+            say(args, f"k {v.k}: plant {v.plant}" + (f", may be {', '.join(names)}" if names else "") + f"; bus {', '.join(f'{n} {s}' for n, s in bus.items())}")
+
+    start = REST if args.rest else MOVING
+    if args.log:
+        detector = Detector(native, start, False, None, watch)
+        from_log(detector, candump.read(Path(args.log)))
+    else:
+        options = bus_options(args)
+        if not options:
+            raise InputError("detect needs a bus (-i INTERFACE -c CHANNEL) or a log (--log FILE)")
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, stop)
+        with opened(**options) as link:
+            detector = Detector(native, start, args.lockstep, None if args.listen else link.send, watch)
+            if args.ready:
+                print("ready", flush=True)
+            from_bus(detector, link, made.model.sample_time_s, not args.lockstep, args.samples or 0, lambda: bool(stopped))
+    health = detector.node.health()
+    say(args, f"{detector.samples} samples; " + ", ".join(f"{n} {c}" for n, c in health.items() if c))
+    emit(args, {"model": made.model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "samples": detector.samples, "communication": health, "verdicts": changes})
+    alarms = [c for c in changes if c["plant"] in ALARMS]
+    if args.expect == "quiet" and alarms:
+        raise ExpectationError(f"expected quiet, but there was an alarm at sample {alarms[0]['k']}")
+    if args.expect == "detect" and not alarms:
+        raise ExpectationError("expected a detection, but there was no alarm")
+    return 0
+
+
+# ---- campaign, report ----
+
+
+def run_campaign(args: argparse.Namespace) -> int:
+    """hullguard campaign."""
+    if not 0.0 <= args.loss < 1.0:
+        raise InputError(f"--loss {args.loss:g}: expected a probability from 0 to below 1")
+    if args.runs < 1:
+        raise InputError(f"--runs {args.runs}: expected at least 1")
+    model, made = prepared(args)
+    scenario = model.scenario(args.scenario)
+    samples = args.samples or scenario.samples
+    faults = the_faults(args, model, scenario.faults, samples)
+    job = Job(made.model, made.stored, args.real, samples, scenario.reference, tuple(faults), args.seed, args.loss, REST)
+    began = time.monotonic()
+    with progress(args, "campaign") as tick:
+        done = [0]
+
+        def more(count: int) -> None:
+            done[0] += count
+            tick("runs", done[0], args.runs)
+
+        rows = campaign(job, args.runs, args.workers or os.cpu_count() or 1, more)
+    groups = sum(1 for g in model.groups if not g.closing)
+    result = {
+        "model": model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "scenario": scenario.name, "seed": args.seed, "loss": args.loss,
+        **digest(rows, samples, groups, faults),
+        "rows": rows,
+    }  # fmt: skip
+    alarms = result["false_alarm_runs"]
+    say(args, f"{args.runs} runs of {samples} samples in {time.monotonic() - began:.1f} s; measurement frames {100 * result['measurement_share']:.1f} % of periodic")
+    say(args, f"runs with a false alarm: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J before a fault {result['margin_max']:.3f}")
+    if faults:
+        delay = "never" if result["delay_mean"] is None else f"mean delay {result['delay_mean']:.2f} samples, longest {result['delay_max']}"
+        say(args, f"{', '.join(str(f) for f in faults)}: found in {result['detected_runs']} of {args.runs} runs, {delay}")
+    if args.out:
+        out = Path(args.out)
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "campaign.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    emit(args, result)
+    if args.expect == "quiet" and (alarms["provisional"] or (faults and result["detected_runs"])):
+        raise ExpectationError(f"expected quiet runs: {alarms['provisional']} had a false alarm")
+    if args.expect == "detect" and (not faults or result["confirmed_runs"] < args.runs or alarms["provisional"]):
+        raise ExpectationError("expected every run to find its fault, and none to alarm before")
+    return 0
+
+
+def run_report(args: argparse.Namespace) -> int:
+    """hullguard report."""
+    directory = Path(args.directory)
+    if not directory.is_dir():
+        raise InputError(f"{directory}: no such folder; give the --out folder of a run")
+    _report(args, directory)
+    return 0
+

@@ -1,0 +1,1 @@
+"""Running a model: emulator or recording, senders, a bus, a detector node."""

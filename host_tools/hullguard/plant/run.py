@@ -1,0 +1,334 @@
+"""One run: readings from the emulated plant or a recording, frames by the senders' triggers, a detector node on a bus or in this process.
+
+A second node in this process takes the same frames. It shows what a bus does not carry (values, radii, residuals, thresholds), and in
+lockstep its verdicts must be the remote node's.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from hullguard.bus import candump
+from hullguard.bus.link import CanLink
+from hullguard.core.native import REST, Frame, Native, Node, Sender, Verdict, frame_bits, read_verdict
+from hullguard.design.design import Design
+from hullguard.errors import BusError, ExpectationError
+from hullguard.model.faults import FaultSpec
+
+ANSWER_TIMEOUT_S = 10.0
+ALARMS = ("provisional", "confirmed")
+
+
+class Source(Protocol):
+    """Where readings come from."""
+
+    def read(self) -> list[float]:
+        """Readings of the open sample."""
+
+    def move(self) -> None:
+        """On to the next sample."""
+
+
+@dataclass
+class Trace:
+    """What a run saw, sample by sample."""
+
+    reading: list[list[float]] = field(default_factory=list)
+    value: list[list[float]] = field(default_factory=list)
+    radius: list[list[float]] = field(default_factory=list)
+    r: list[list[float]] = field(default_factory=list)
+    J: list[list[float]] = field(default_factory=list)
+    verdict: list[Verdict] = field(default_factory=list)
+    events: list[tuple[int, ...]] = field(default_factory=list)  # groups that sent
+    bits: list[int] = field(default_factory=list)
+    reply_bits: int = 0  # of frames sent only because lockstep answers every tick
+    counts: dict[str, int] = field(default_factory=lambda: {"measurement": 0, "closing": 0, "verdict": 0, "reply": 0})
+    health: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast: lockstep waits for the node's verdict on every tick, otherwise `speed` times real time."""
+
+    lockstep: bool
+    speed: float = 1.0
+
+
+class Bus(Protocol):
+    """Where frames go. `answer` gives the frames that the node sent for sample k."""
+
+    def send(self, frame: Frame, time_s: float) -> None:
+        """One frame from a sender."""
+
+    def answer(self, k: int, expected: list[Frame], time_s: float) -> list[tuple[Frame, float]]:
+        """What came back."""
+
+
+class InProcess:
+    """No bus at all: the shadow node's own frames are the answer."""
+
+    def send(self, frame: Frame, time_s: float) -> None:
+        """Nothing to do: the shadow node has it already."""
+
+    def answer(self, k: int, expected: list[Frame], time_s: float) -> list[tuple[Frame, float]]:
+        """The shadow node's frames."""
+        return [(f, time_s) for f in expected]
+
+
+class OnCan:
+    """A bus with a node at its other end."""
+
+    def __init__(self, link: CanLink, native: Native, pace: Pace) -> None:
+        self._link, self._native, self._pace = link, native, pace
+        self._last = -1  # stamp of the last verdict: a status frame follows it
+
+    def send(self, frame: Frame, time_s: float) -> None:
+        """One frame from a sender."""
+        self._link.send(frame)
+
+    def answer(self, k: int, expected: list[Frame], time_s: float) -> list[tuple[Frame, float]]:
+        """In lockstep wait for as many of the node's frames as the shadow node sent; otherwise take what is there."""
+        found: list[tuple[Frame, float]] = []
+        end = time.monotonic() + ANSWER_TIMEOUT_S
+        while True:
+            if self._pace.lockstep and len(found) >= len(expected):
+                return found
+            left = end - time.monotonic()
+            got = self._link.receive(max(left, 0.0) if self._pace.lockstep else 0.0)
+            if got is None:
+                if not self._pace.lockstep:
+                    return found
+                raise BusError(f"the detector node did not answer sample {k} within {ANSWER_TIMEOUT_S:g} s; is it running with --lockstep on this bus?")
+            if got[0].id in (self._native.tables.verdict.id, self._native.tables.status.id):
+                found.append(got)
+
+
+class Run:
+    """The loop."""
+
+    def __init__(self, design: Design, native: Native, bus: Bus, pace: Pace, log: candump.Writer | None = None) -> None:
+        self.design, self.native, self.bus, self.pace = design, native, bus, pace
+        self.sender, self.node, self.trace = Sender(native), Node(native, REST), Trace()
+        self._log = log
+        closing = native.tables.closing
+        self._order = [g for g in range(len(native.tables.groups)) if g != closing] + [closing]
+        self.mismatch: str | None = None
+
+    def samples(self, source: Source, count: int, watch: Callable[[int, Trace], None] | None = None) -> Trace:
+        """Make `count` samples. `watch` is called after each."""
+        started = time.monotonic()
+        period = self.design.model.sample_time_s
+        for k in range(count):
+            if not self.pace.lockstep:
+                time.sleep(max(0.0, started + k * period / self.pace.speed - time.monotonic()))
+            self._sample(source, k, k * period)
+            if watch is not None:
+                watch(k, self.trace)
+            source.move()
+        self.trace.health = self.node.health()
+        return self.trace
+
+    def _sample(self, source: Source, k: int, time_s: float) -> None:
+        reading = source.read()
+        events, bits = [], 0
+        for g in self._order:
+            frame = self.sender.step(g, k, reading)
+            if frame is None:
+                continue
+            events.append(g)
+            self._write(frame, time_s)
+            self.node.receive(frame)
+            self.bus.send(frame, time_s)
+            bits += frame_bits(self.native.library, frame)
+            self.trace.counts["closing" if g == self.native.tables.closing else "measurement"] += 1
+        verdict = self.node.step()
+        if verdict is None:
+            raise ExpectationError(f"the closing frame of sample {k} was not accepted: {self.node.health()}")
+        expected = self.node.report(self.pace.lockstep)
+        bits += self._answers(k, verdict, expected, time_s)
+        self._record(reading, verdict, tuple(sorted(events)), bits)
+
+    def _answers(self, k: int, verdict: Verdict, expected: list[Frame], time_s: float) -> int:
+        """Frames of the node: logged, counted, and in lockstep compared. The bits of those that a free-running node would send too."""
+        bits = 0
+        got = self.bus.answer(k, expected, time_s)
+        for frame, stamp in got:
+            self._write(frame, stamp)
+            told = read_verdict(self.native, frame)
+            length = frame_bits(self.native.library, frame)
+            if told is not None and told.reply:
+                self.trace.counts["reply"] += 1
+                self.trace.reply_bits += length
+            else:
+                self.trace.counts["verdict"] += 1
+                bits += length
+        if self.pace.lockstep and self.mismatch is None:
+            for frame, own in zip([f for f, _ in got], expected, strict=True):
+                if frame != own:
+                    self.mismatch = f"sample {k}: the node answered {frame.data.hex()} ({read_verdict(self.native, frame)}), this process {own.data.hex()} ({verdict})"
+        return bits
+
+    def _write(self, frame: Frame, time_s: float) -> None:
+        if self._log is not None:
+            self._log.write(time_s, frame)
+
+    def _record(self, reading: list[float], verdict: Verdict, events: tuple[int, ...], bits: int) -> None:
+        t = self.trace
+        t.reading.append(reading)
+        t.value.append(self.node.value)
+        t.radius.append(self.node.radius)
+        t.r.append(self.node.r)
+        t.J.append(self.node.J)
+        t.verdict.append(verdict)
+        t.events.append(events)
+        t.bits.append(bits)
+
+
+def periodic_bits(design: Design, native: Native, readings: Sequence[Sequence[float]]) -> tuple[int, int, int]:
+    """Frames, bits, and bits of the measurement groups alone, if every group sent every sample through the same codec."""
+    tables = native.tables
+    groups = tuple(
+        replace(g, levels=1, interval_max=1, silence=(0,), delta=g.delta[:1], sigma=g.sigma[:1], activity=g.activity[:1]) for g in tables.groups
+    )
+    every = Native(native.library, replace(tables, groups=groups))
+    sender = Sender(every)
+    frames = bits = measured = 0
+    for k, reading in enumerate(readings):
+        for g in range(len(groups)):
+            frame = sender.step(g, k, reading)
+            if frame is not None:
+                length = frame_bits(native.library, frame)
+                frames, bits = frames + 1, bits + length
+                measured += 0 if g == tables.closing else length
+    return frames, bits, measured
+
+
+def summary(design: Design, native: Native, trace: Trace, faults: Sequence[FaultSpec], facts: dict[str, Any]) -> dict[str, Any]:
+    """The object that --json prints; `facts` are what only the caller knows (bus, seed, scenario)."""
+    model, tables = design.model, native.tables
+    samples = len(trace.verdict)
+    first = min((f.start for f in faults), default=samples)
+    frames_periodic, bits_periodic, bits_measured = periodic_bits(design, native, trace.reading)
+    load = _load(trace.bits, model.sample_time_s, model.bitrate_bps)
+    groups, intervals = _intervals(tables.groups, tables.closing, trace.events)
+    alarms = [v.plant in ALARMS for v in trace.verdict]
+    confirmed = [v.plant == "confirmed" for v in trace.verdict]
+    counts = trace.counts
+    margin = max((abs(r) / J for k in range(min(first, samples)) for r, J in zip(trace.r[k], trace.J[k], strict=True)), default=0.0)
+    return {
+        "model": model.name,
+        "model_hash": f"{tables.hash:08x}",
+        "real": native.library.real,
+        **facts,
+        "bitrate": model.bitrate_bps,
+        "samples": samples,
+        "sample_time_s": model.sample_time_s,
+        "frames": {
+            "measurement": counts["measurement"],
+            "periodic": frames_periodic,
+            "total": counts["measurement"] + counts["closing"] + counts["verdict"],
+            "lockstep_replies": counts["reply"],
+            "bits": sum(trace.bits),
+            "bits_periodic": bits_periodic,
+            "bits_periodic_measurement": bits_measured,
+            "bits_lockstep_replies": trace.reply_bits,
+            "load_mean": load[0],
+            "load_p99": load[1],
+            "load_bound": design.load_bound,
+        },
+        "per_group": groups,
+        "events": {"interval_min": min(intervals, default=None), "interval_max": max(intervals, default=None)},
+        "faults": [_found(f, native, design, trace, alarms, confirmed, samples) for f in faults],
+        "false_alarms": {"provisional": _episodes(alarms[:first]), "confirmed": _episodes(confirmed[:first])},
+        "communication": trace.health,
+        "margin_max": margin,
+        "verdicts": _changes(tables.groups, trace.verdict),
+    }
+
+
+def _load(bits: Sequence[int], sample_time_s: float, bitrate: int) -> tuple[float, float]:
+    """Mean load and the 99th percentile over windows of one second."""
+    window = max(1, round(1.0 / sample_time_s))
+    sums = np.convolve(bits, np.ones(min(window, len(bits))), "valid")
+    return float(np.sum(bits) / (len(bits) * sample_time_s * bitrate)), float(np.percentile(sums, 99) / (min(window, len(bits)) * sample_time_s * bitrate))
+
+
+def _intervals(groups: Sequence[Any], closing: int, events: Sequence[tuple[int, ...]]) -> tuple[dict[str, Any], list[int]]:
+    per_group, every = {}, []
+    for i, g in enumerate(groups):
+        at = [k for k, e in enumerate(events) if i in e]
+        gaps = np.diff(at)
+        values, counts = np.unique(gaps, return_counts=True)
+        per_group[g.name] = {
+            "frames": len(at),
+            "interval_min": int(gaps.min()) if len(gaps) else None,
+            "interval_max": int(gaps.max()) if len(gaps) else None,
+            "interval_mean": float(gaps.mean()) if len(gaps) else None,
+            "histogram": {str(v): int(c) for v, c in zip(values, counts, strict=True)},
+        }
+        if i != closing:
+            every += [int(x) for x in gaps]
+    return per_group, every
+
+
+def _episodes(flags: Sequence[bool]) -> int:
+    return sum(1 for before, now in zip([False, *flags], flags, strict=False) if now and not before)
+
+
+def _found(f: FaultSpec, native: Native, design: Design, trace: Trace, alarms: list[bool], confirmed: list[bool], samples: int) -> dict[str, Any]:
+    detected = next((k for k in range(f.start, samples) if alarms[k]), None)
+    sure = next((k for k in range(f.start, samples) if confirmed[k]), None)
+    bits = trace.verdict[detected].candidates if detected is not None else 0
+    return {
+        "name": f.name,
+        "kind": f.kind,
+        "spec": str(f),
+        "start": f.start,
+        "detected_at": detected,
+        "confirmed_at": sure,
+        "delay": None if detected is None else detected - f.start,
+        "candidates": [x.name for i, x in enumerate(design.model.faults) if bits >> i & 1],
+    }
+
+
+def _changes(groups: Sequence[Any], verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    changes: list[dict[str, Any]] = []
+    for v in verdicts:
+        row = {"plant": v.plant, "bus": {g.name: b for g, b in zip(groups, v.bus, strict=True)}}
+        if not changes or {"plant": changes[-1]["plant"], "bus": changes[-1]["bus"]} != row:
+            changes.append({"k": v.k, **row})
+    return changes
+
+
+def write_files(directory: Path, design: Design, native: Native, trace: Trace, faults: Sequence[FaultSpec], result: dict[str, Any]) -> None:
+    """run.json, signals.csv and labels.csv: all that a report or a doubt needs."""
+    model, tables = design.model, native.tables
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / "run.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    names = [s.name for s in model.signals]
+    residuals = [f"{g + 1}.{i + 1}" for g, t in enumerate(tables.generators) for i in range(len(t.output))]
+    header = ["time_s", "k"] + [c for n in names for c in (n, f"{n}.value", f"{n}.radius")]
+    header += [c for x in residuals for c in (f"r{x}", f"J{x}")] + ["plant"] + [f"event.{g.name}" for g in tables.groups] + ["bits"]
+    codes = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
+    with (directory / "signals.csv").open("w", encoding="utf-8") as file:
+        file.write(",".join(header) + "\n")
+        for k, v in enumerate(trace.verdict):
+            row = [f"{k * model.sample_time_s:.6f}", str(k)]
+            for i in range(len(names)):
+                row += [f"{trace.reading[k][i]:.9g}", f"{trace.value[k][i]:.9g}", f"{trace.radius[k][i]:.9g}"]
+            for r, J in zip(trace.r[k], trace.J[k], strict=True):
+                row += [f"{r:.9g}", f"{J:.9g}"]
+            row += [str(codes[v.plant])] + [str(int(g in trace.events[k])) for g in range(len(tables.groups))] + [str(trace.bits[k])]
+            file.write(",".join(row) + "\n")
+    with (directory / "labels.csv").open("w", encoding="utf-8") as file:
+        file.write("start,end,name,kind,size,signal\n")
+        for f in faults:
+            end = "" if f.end is None else str(f.end)
+            file.write(f"{f.start},{end},{f.name},{f.kind},{'' if f.kind == 'freeze' else f'{f.size:g}'},{names[model.signal(f.name)]}\n")

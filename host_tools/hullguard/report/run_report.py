@@ -1,0 +1,240 @@
+"""The report of a finished run: one HTML file that needs nothing else, and one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from hullguard.errors import InputError
+from hullguard.report import run_figures as draw
+from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
+from hullguard.report.run_data import FaultRun, Run, read_run
+
+VERDICTS_MAX = 200  # rows of the table of changes
+GUARANTEE = (
+    "Guaranteed: as long as the plant keeps to the model, its disturbances, noise, initial state, signal ranges and slews stay within the bounds the model states, and no corrupted frame passes its "
+    "end-to-end check, no residual can exceed its threshold, whatever is sent late, lost or not at all; so a confirmed fault means that the plant or one of these bounds is broken."
+)
+LIMITS = "Not guaranteed: that every fault is found (one that stays below the thresholds is not), or that frames are authentic: the check protects against errors, not against an attacker."
+
+
+def write_run_report(directory: Path) -> Path:
+    """Read a finished run's directory and write report.html into it."""
+    run = read_run(directory)
+    with mpl.rc_context(RC):
+        text = page(f"Run of {run.info['model']}", _body(run))
+    path = directory / "report.html"
+    _write(path, text.encode())
+    return path
+
+
+def write_picture(directory: Path, png_path: Path) -> Path:
+    """Residuals, events and verdict of a run as one PNG, 1200 pixels wide."""
+    run = read_run(directory)
+    with mpl.rc_context(RC | {"savefig.facecolor": "white"}):
+        figure = draw.overview_figure(run, draw.whole(run))
+        FigureCanvasAgg(figure)
+        try:
+            figure.savefig(png_path, format="png", dpi=120, metadata={"Software": None})
+        except OSError as error:
+            raise InputError(f"{png_path}: cannot be written: {error.strerror}") from error
+    return png_path
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _body(run: Run) -> Iterator[str]:
+    yield from _summary(run)
+    whole = draw.whole(run)
+    many = len({r.generator for r in run.residuals})
+    shown, hidden, generators = draw.chosen_residuals(run)
+
+    yield "<h2>Residuals and thresholds</h2>"
+    left = "" if not hidden else f" {plural(hidden, 'residual')} not drawn here" + (f" ({plural(generators, 'whole generator')})" if generators else "") + ": none of them came closer to its threshold or alarmed earlier."
+    yield f"<p>A fault is declared when a residual leaves its threshold. The threshold moves: it is the largest value a healthy plant can show, given what the detector knows.{esc(left)}</p>"
+    zoom = draw.close_up(run)
+    if zoom:
+        w, fault = zoom
+        yield picture(draw.residual_figure(run, w, draw.near(run, w, shown, 4)), "zoom", f"Residuals around fault {fault.label}", f"Around fault {fault.label} ({fault.spec}): residuals, dimensionless, that came closest to their thresholds.")
+    long = " Every column of the picture shows the least and the largest of its samples." if len(run.k) > 2 * draw.BINS else ""
+    yield picture(draw.residual_figure(run, whole, shown), "residuals", "Residuals within their thresholds", f"Residuals rG.I (generator G, dimensionless) within ±J over the whole run.{long}")
+    if len(run.residuals) > 3:
+        yield picture(draw.ratio_figure(run, whole), "ratios", "All residuals relative to their thresholds", f"All {len(run.residuals)} residuals of {many} generators: |r|/J, the largest of each column. Samples at which the detector was still starting count as 0.")
+
+    yield "<h2>Verdict</h2>"
+    yield picture(draw.verdict_figure(run, whole), "verdict", "Verdict timeline", "What the detector said of the plant, and of the frames of each group, over the whole run. Where changes are too close to draw, the worst one shows.")
+    yield from _verdict_table(run)
+
+    yield "<h2>Events on the bus</h2>"
+    yield picture(draw.event_figure(run, whole), "events", "Frames of each group", "When each group sent, how long it was silent before, and how often each interval occurred.")
+    yield _group_table(run)
+
+    yield "<h2>Bus load</h2>"
+    seconds = draw.load_window(run) * run.sample_time_s
+    yield picture(draw.load_figure(run, whole), "load", "Bus load", f"All frames on the bus, averaged over the last {num(seconds)} s, at {num(run.bitrate / 1000)} kbit/s. Periodic: every group with every sample, same frames.")
+    yield _load_table(run)
+
+    yield "<h2>Signals</h2>"
+    yield "<p>The detector works on values and radii only: the true reading has to lie in the band. A sensor's fault is in the reading that is sent, and in the band.</p>"
+    if zoom:
+        yield picture(draw.signal_figure(run, zoom[0]), "near", f"Signals around fault {zoom[1].label}", f"Around fault {zoom[1].label} ({zoom[1].spec}).")
+    yield picture(draw.signal_figure(run, whole), "signals", "Signals as read and as known to the detector", f"The whole run.{long}")
+
+    yield "<h2>Communication</h2>"
+    yield _communication(run)
+    yield "<h2>The run</h2>"
+    yield _facts(run)
+
+
+# --- summary -------------------------------------------------------------------------------------------------------------
+
+
+def _when(run: Run, k: int) -> str:
+    return f"sample {k} ({num(k * run.sample_time_s, 5)} s)"
+
+
+def _delay(run: Run, samples: float) -> str:
+    return f"{num(samples)} sample{'' if samples == 1 else 's'} ({num(samples * run.sample_time_s)} s)"
+
+
+def delay_of(f: FaultRun) -> float | None:
+    """Samples from a fault's start to its detection."""
+    return f.delay if f.delay is not None else None if f.detected is None else float(f.detected - f.start)
+
+
+def headline(run: Run) -> str:
+    """The run in one sentence or two."""
+    alarms = run.info["false_alarms"]
+    false = round(alarms["provisional"]), round(alarms["confirmed"])
+    if not run.faults:
+        first = "No fault was injected"
+    elif len(run.faults) == 1:
+        f, delay = run.faults[0], delay_of(run.faults[0])
+        first = f"{f.spec} began at {_when(run, f.start)} and was " + ("not found" if delay is None else f"found {_delay(run, delay)} later")
+    else:
+        found = [f for f in run.faults if f.detected is not None]
+        slowest = max((delay_of(f) or 0.0 for f in found), default=0.0)
+        first = f"{len(found)} of {len(run.faults)} faults were found" + (f", the slowest after {_delay(run, slowest)}" if found else "")
+    if not any(false):
+        second = "no false alarm"
+    else:
+        second = f"{plural(false[1], 'confirmed')} and {plural(false[0], 'provisional').removesuffix('s')} false alarm{'' if sum(false) == 1 else 's'}".replace("confirmeds", "confirmed")
+    return f"{first}; {second}."
+
+
+def _summary(run: Run) -> Iterator[str]:
+    info = run.info
+    seconds = num(len(run.k) * run.sample_time_s, 5)
+    yield f"<h1>hullguard run: {esc(info['model'])}, scenario {esc(info['scenario'])}</h1>"
+    yield f"<p class=\"note\">{len(run.k)} samples, {esc(seconds)} s at {esc(num(run.sample_time_s * 1000))} ms; bus {esc(info['bus'])}; {esc(info['real'])} arithmetic; seed {esc(info['seed'])}; model hash <code>{esc(info['model_hash'])}</code></p>"
+    yield f'<p class="lead">{esc(headline(run))}</p>'
+    yield '<div class="tiles">' + "".join(_tiles(run)) + "</div>"
+    if run.faults:
+        yield _fault_table(run)
+    yield f"<aside><p>{esc(GUARANTEE)}</p><p class=\"note\">{esc(LIMITS)}</p></aside>"
+
+
+def _tiles(run: Run) -> Iterator[str]:
+    info, frames = run.info, run.info["frames"]
+    if run.faults:
+        f = min(run.faults, key=lambda f: f.start)
+        yield tile("fault began" if len(run.faults) == 1 else f"first of {len(run.faults)} faults began", f"k = {f.start}", f"{num(f.start * run.sample_time_s, 5)} s: {f.name}, {f.kind}")
+        found = [f for f in run.faults if f.detected is not None]
+        if len(run.faults) == 1:
+            if found and f.detected is not None:
+                confirmed = "not confirmed" if f.confirmed is None else "confirmed at once" if f.confirmed == f.detected else f"confirmed k = {f.confirmed}"
+                yield tile("fault found", f"k = {f.detected}", f"{num(f.detected * run.sample_time_s, 5)} s, {confirmed}", "good")
+            else:
+                yield tile("fault found", "no", "not within this run", "bad")
+        else:
+            missed = len(run.faults) - len(found)
+            yield tile("faults found", f"{len(found)} of {len(run.faults)}", "all of them" if not missed else f"{missed} not found", "bad" if missed else "good")
+        delays = [d for d in (delay_of(f) for f in found) if d is not None]
+        if delays:
+            mean = sum(delays) / len(delays)
+            yield tile("delay" if len(delays) == 1 else "mean delay", plural(round(mean), "sample") if float(mean).is_integer() else f"{num(mean)} samples", f"{num(mean * run.sample_time_s)} s" + ("" if len(delays) == 1 else f", longest {num(max(delays))} samples"))
+    alarms = info["false_alarms"]
+    confirmed, provisional = round(alarms["confirmed"]), round(alarms["provisional"])
+    yield tile("false alarms", str(confirmed + provisional), f"{confirmed} confirmed, {provisional} provisional", "bad" if confirmed + provisional else "good")
+    event = [g for g in run.groups if not draw.is_every_sample(g, len(run.k))]
+    if event:
+        sent, all_of_them = sum(g.frames for g in event), len(event) * len(run.k)
+        yield tile("event frames sent", percent(sent / all_of_them), f"{sent} of {all_of_them} periodic")
+    yield tile("bits on the bus", percent(frames["bits"] / frames["bits_periodic"] if frames["bits_periodic"] else None), f"of periodic; mean load {percent(frames['load_mean'])}")
+    margin = info["margin_max"]
+    yield tile("largest |r|/J" + (" before the fault" if run.faults else ""), num(margin), "alarm above 1", "" if margin is None else "good" if margin <= 1 else "bad")
+
+
+def _fault_table(run: Run) -> str:
+    rows = []
+    for f in run.faults:
+        found: object = Cell("not found", "bad") if f.detected is None else f.detected
+        delay = delay_of(f)
+        until = "end" if f.end is None else f.end
+        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, ", ".join(f.candidates) or "–"])
+    return table(["", "fault", "#start", "#until", "#detected", "#confirmed", "#delay (samples)", "#delay (s)", "candidates named"], rows)
+
+
+# --- tables --------------------------------------------------------------------------------------------------------------
+
+
+def _group_table(run: Run) -> str:
+    rows = []
+    for g in run.groups:
+        sends = "every sample" if draw.is_every_sample(g, len(run.k)) else "by events"
+        rows.append([g.name, sends, g.frames, percent(g.frames / len(run.k)), g.interval_min, g.interval_mean, g.interval_max])
+    return table(["group", "sends", "#frames", "#of periodic", "#shortest interval", "#mean", "#longest"], rows, "Intervals in samples.")
+
+
+def _load_table(run: Run) -> str:
+    f = run.info["frames"]
+    rows = [
+        ["frames of measurements", f["measurement"], ""],
+        ["frames, periodic sending", f["periodic"], "all groups, every sample, same codec"],
+        ["frames on the bus", f["total"], "verdict and status frames included"],
+        ["bits on the bus", f["bits"], "stuff bits and interframe space included"],
+        ["bits, periodic sending", f["bits_periodic"], ""],
+        ["load, mean", percent(f["load_mean"]), ""],
+        ["load, 99 % of samples below", percent(f["load_p99"]), ""],
+        ["load, worst case of the design", percent(f["load_bound"]), "every sender at its shortest interval, longest stuffing"],
+    ]
+    return table(["", "#value", ""], rows)
+
+
+def _communication(run: Run) -> str:
+    counters = run.info["communication"]
+    rows = [[str(name).replace("_", " "), value] for name, value in counters.items() if isinstance(value, (int, float))]
+    if not rows:
+        return "<p>No counters.</p>"
+    busy = [r for r in rows if r[1]]
+    lead = "Nothing was lost, late or refused: all counters are 0." if not busy else "Counters of the detector's receive side; each only grows."
+    return f"<p>{esc(lead)}</p>" + table(["counter", "#count"], rows)
+
+
+def _verdict_table(run: Run) -> Iterator[str]:
+    rows = [[k, num(k * run.sample_time_s, 6), plant, ", ".join(f"{g} {h}" for g, h in bus.items())] for k, plant, bus in run.verdicts[:VERDICTS_MAX]]
+    more = "" if len(run.verdicts) <= VERDICTS_MAX else f"The first {VERDICTS_MAX} of {len(run.verdicts)}; all are in run.json."
+    if rows:
+        yield f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>" + table(["#sample", "#time (s)", "plant", "bus"], rows, more) + "</details>"
+
+
+def _facts(run: Run) -> str:
+    info = run.info
+    rows = [
+        ["model", f"{info['model']}, hash {info['model_hash']}"],
+        ["scenario", info["scenario"]],
+        ["samples", f"{len(run.k)} of {num(run.sample_time_s * 1000)} ms"],
+        ["seed", info["seed"]],
+        ["arithmetic", info["real"]],
+        ["bus", f"{info['bus']}, {num(run.bitrate / 1000)} kbit/s"],
+        ["signals, groups, residuals", f"{len(run.signals)}, {len(run.groups)}, {len(run.residuals)}"],
+    ]
+    return table(["", ""], rows) + '<p class="note">All numbers come from run.json and signals.csv in the same directory; the same seed gives the same run.</p>'

@@ -1,0 +1,984 @@
+/** @file
+ *  node.h: frames to samples, verdicts to frames, and the inbox between interrupt and main loop. */
+#include "support.h"
+
+#include "hullguard/node.h"
+
+#include "small_model.h"
+
+#define HEARTBEAT 5U
+#define HASH 0x89ABCDEFUL
+
+static const uint8_t ids[4][HG_E2E_IDS] = {
+    {0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U, 0x11U},
+    {0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U, 0x22U},
+    {0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U, 0x33U},
+    {0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U, 0x44U}};
+static const hg_field fields[2] = {{16U, 16U, HG_FIELD_SIGNED}, {32U, 16U, HG_FIELD_SIGNED}};
+static const hg_message messages[SM_GROUPS] = {
+    {.id = 0x101U, .length = 6U, .width = 2U, .field = fields, .scale = sm_scale, .data_id = ids[0]},
+    {.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .data_id = ids[1]}};
+static const hg_message verdict_message = {.id = 0x200U, .length = 8U, .data_id = ids[2]};
+static const hg_message status_message = {.id = 0x201U, .length = 8U, .data_id = ids[3]};
+static const hg_node_config usual = {.detector = &sm_detector, .message = messages, .closing = 1U, .verdict = &verdict_message,
+                                     .status = &status_message, .heartbeat = HEARTBEAT, .model_hash = HASH};
+
+typedef struct {
+    hg_node        self;
+    sm_storage     storage;
+    hg_link        link[SM_GROUPS];
+    int32_t        closing[2];
+    hg_node_memory memory;
+    hg_verdict     verdict;
+    uint8_t        counter[SM_GROUPS];
+} rig;
+
+static void begin_with(rig *r, const hg_node_config *config, hg_start how)
+{
+    (void)memset(r, 0x5A, sizeof(*r));
+    arm_codes(r->closing, 2U);
+    r->memory = (hg_node_memory){.detector = sm_memory(&r->storage), .link = r->link, .closing = r->closing};
+    r->counter[0] = 7U;
+    r->counter[1] = 11U;
+    assert_status(HG_OK, hg_node_start(&r->self, config, &r->memory, how));
+}
+
+static void begin(rig *r, hg_start how)
+{
+    begin_with(r, &usual, how);
+}
+
+static hg_can_frame frame_of(rig *r, uint8_t group, uint32_t k, int32_t a, int32_t b)
+{
+    const int32_t code[2] = {a, b};
+    hg_can_frame frame;
+    hg_frame_pack(&messages[group], code, &frame);
+    assert_status(HG_OK, hg_e2e_p22_protect(frame.data, frame.length, messages[group].data_id, r->counter[group], (uint8_t)(k & 15U)));
+    r->counter[group]++;
+    return frame;
+}
+
+static hg_status give(rig *r, uint8_t group, uint32_t k, int32_t a, int32_t b)
+{
+    const hg_can_frame frame = frame_of(r, group, k, a, b);
+    return hg_node_receive(&r->self, &frame);
+}
+
+static void step(rig *r, uint32_t k)
+{
+    (void)memset(&r->verdict, 0x5A, sizeof(r->verdict));
+    assert_status(HG_OK, hg_node_step(&r->self, &r->verdict));
+    assert_true(r->verdict.k == k);
+    assert_true(r->verdict.model_hash == HASH);
+    assert_int_equal(HG_BASIS_SET, r->verdict.basis);
+    sm_check_canaries(&r->storage);
+    assert_codes_untouched(&r->closing[1], 1U);
+}
+
+static void nothing_is_due(rig *r)
+{
+    const hg_node before = r->self;
+    arm_codes((int32_t *)&r->verdict.k, 1U);
+    assert_status(HG_E_EMPTY, hg_node_step(&r->self, &r->verdict));
+    assert_true(r->verdict.k == (uint32_t)CANARY_CODE);
+    assert_memory_equal(&before, &r->self, sizeof(before));
+}
+
+/* A whole good sample of both groups. */
+static void sample(rig *r, uint32_t k, int32_t a, int32_t b, int32_t c)
+{
+    assert_status(HG_OK, give(r, 0U, k, a, b));
+    nothing_is_due(r);
+    assert_status(HG_OK, give(r, 1U, k, c, 0));
+    step(r, k);
+    nothing_is_due(r);
+}
+
+static unsigned bus(const rig *r, uint8_t group)
+{
+    return ((unsigned)r->verdict.bus >> (2U * group)) & 3U;
+}
+
+/* ---- sender ---- */
+
+static void a_sender_refuses_null_and_contradictions(void **state)
+{
+    (void)state;
+    hg_sender self;
+    int32_t codes[4];
+    const hg_sender_config good = {.message = &messages[0], .trigger = &sm_trigger_a};
+    const hg_sender_config no_message = {.message = NULL, .trigger = &sm_trigger_a};
+    const hg_sender_config no_trigger = {.message = &messages[0], .trigger = NULL};
+    assert_status(HG_E_ARGUMENT, hg_sender_start(NULL, &good, codes));
+    assert_status(HG_E_ARGUMENT, hg_sender_start(&self, NULL, codes));
+    assert_status(HG_E_ARGUMENT, hg_sender_start(&self, &good, NULL));
+    assert_status(HG_E_ARGUMENT, hg_sender_start(&self, &no_message, codes));
+    assert_status(HG_E_ARGUMENT, hg_sender_start(&self, &no_trigger, codes));
+    hg_message broken = messages[0];
+    broken.length = 5U;
+    hg_trigger_config dumb = sm_trigger_a;
+    dumb.levels = 0U;
+    const hg_sender_config c[] = {
+        {.message = &broken, .trigger = &sm_trigger_a}, {.message = &messages[1], .trigger = &sm_trigger_a}, {.message = &messages[0], .trigger = &dumb}};
+    for (size_t i = 0U; i < COUNT(c); i++) {
+        assert_status(HG_E_CONFIG, hg_sender_start(&self, &c[i], codes));
+    }
+}
+
+static void a_sender_stamps_counts_and_protects_what_it_sends(void **state)
+{
+    (void)state;
+    hg_sender self;
+    int32_t codes[3] = {0, 0, CANARY_CODE};
+    const hg_sender_config c = {.message = &messages[1], .trigger = &sm_trigger_b};
+    assert_status(HG_OK, hg_sender_start(&self, &c, codes));
+    for (uint32_t k = 100U; k < 200U; k++) {
+        hg_can_frame frame;
+        int32_t code = CANARY_CODE;
+        const hg_real value = R((double)k * SM_RESOLUTION);
+        (void)memset(&frame, 0x5A, sizeof(frame));
+        assert_status(HG_OK, hg_sender_step(&self, k, &value, &frame));
+        assert_int_equal((int)((k - 100U) & 15U), frame.data[1] & 15);
+        assert_int_equal((int)(k & 15U), frame.data[1] >> 4);
+        assert_int_equal(hg_e2e_p22_crc(frame.data, 4U, ids[1]), frame.data[0]);
+        assert_status(HG_OK, hg_frame_unpack(&messages[1], &frame, &code));
+        assert_count(k, code);
+    }
+    assert_codes_untouched(&codes[2], 1U);
+}
+
+static void a_silent_sender_leaves_the_frame_and_its_counter_alone(void **state)
+{
+    (void)state;
+    hg_sender self;
+    int32_t codes[4];
+    const hg_sender_config c = {.message = &messages[0], .trigger = &sm_trigger_a};
+    const hg_real value[2] = {R(1), R(2)};
+    hg_can_frame frame;
+    hg_can_frame before;
+    assert_status(HG_OK, hg_sender_start(&self, &c, codes));
+    assert_status(HG_OK, hg_sender_step(&self, 0U, value, &frame));
+    (void)memset(&frame, 0x5A, sizeof(frame));
+    before = frame;
+    for (uint32_t k = 1U; k < 4U; k++) {
+        assert_status(HG_E_EMPTY, hg_sender_step(&self, k, value, &frame));
+        assert_memory_equal(&before, &frame, sizeof(frame));
+    }
+    assert_status(HG_OK, hg_sender_step(&self, 4U, value, &frame));
+    assert_int_equal(0x41, frame.data[1]);
+}
+
+static void what_cannot_be_sent_goes_out_as_invalid(void **state)
+{
+    (void)state;
+    const hg_real bad[] = {REAL_NAN, REAL_INF, -REAL_INF, R(47.0), R(-47.0), HG_REAL_MAX};
+    hg_sender self;
+    int32_t codes[2];
+    const hg_sender_config c = {.message = &messages[1], .trigger = &sm_trigger_b};
+    assert_status(HG_OK, hg_sender_start(&self, &c, codes));
+    for (size_t i = 0U; i < COUNT(bad); i++) {
+        hg_can_frame frame;
+        assert_status(HG_OK, hg_sender_step(&self, 0U, &bad[i], &frame));
+        assert_int_equal(0x00, frame.data[2]);
+        assert_int_equal(0x80, frame.data[3]);
+    }
+}
+
+/* ---- start ---- */
+
+static void a_node_refuses_null(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    assert_status(HG_E_ARGUMENT, hg_node_start(NULL, &usual, &r.memory, HG_START_REST));
+    assert_status(HG_E_ARGUMENT, hg_node_start(&r.self, NULL, &r.memory, HG_START_REST));
+    assert_status(HG_E_ARGUMENT, hg_node_start(&r.self, &usual, NULL, HG_START_REST));
+    hg_node_memory m[4] = {r.memory, r.memory, r.memory, r.memory};
+    m[0].link = NULL;
+    m[1].closing = NULL;
+    m[2].detector.real = NULL;
+    m[3].detector.alarm = NULL;
+    for (size_t i = 0U; i < COUNT(m); i++) {
+        assert_status(HG_E_ARGUMENT, hg_node_start(&r.self, &usual, &m[i], HG_START_REST));
+    }
+    hg_node_memory shorter = r.memory;
+    shorter.detector.codes--;
+    assert_status(HG_E_SIZE, hg_node_start(&r.self, &usual, &shorter, HG_START_REST));
+    shorter = r.memory;
+    shorter.detector.reals--;
+    assert_status(HG_E_SIZE, hg_node_start(&r.self, &usual, &shorter, HG_START_REST));
+}
+
+static void a_node_refuses_contradictions(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    hg_message broken = verdict_message;
+    broken.data_id = NULL;
+    hg_message seven = verdict_message;
+    seven.length = 7U;
+    hg_message with_field = {.id = 0x200U, .length = 8U, .width = 1U, .field = fields, .scale = sm_scale, .data_id = ids[2]};
+    hg_message swapped[SM_GROUPS] = {messages[1], messages[0]};
+    hg_message damaged[SM_GROUPS] = {messages[0], messages[1]};
+    damaged[1].length = 3U;
+    hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
+    hold[1].trigger = NULL;
+    hg_detector_config d[5] = {sm_detector, sm_detector, sm_detector, sm_detector, sm_detector};
+    d[0].groups = (uint8_t)(HG_GROUPS_MAX + 1U);
+    d[1].hold = NULL;
+    d[2].hold = hold;
+    d[3].generators = 0U;
+    d[4].groups = 1U;
+    hg_node_config c[20];
+    for (size_t i = 0U; i < COUNT(c); i++) {
+        c[i] = usual;
+    }
+    c[0].detector = NULL;
+    c[1].message = NULL;
+    c[2].verdict = NULL;
+    c[3].status = NULL;
+    c[4].heartbeat = 0U;
+    c[5].verdict = &broken;
+    c[6].status = &broken;
+    c[7].verdict = &seven;
+    c[8].status = &seven;
+    c[9].verdict = &with_field;
+    c[10].status = &with_field;
+    c[11].closing = SM_GROUPS;
+    c[12].closing = 255U;
+    c[13].message = swapped;
+    c[14].message = damaged;
+    for (size_t i = 0U; i < COUNT(d); i++) {
+        c[15U + i].detector = &d[i];
+    }
+    for (size_t i = 0U; i < COUNT(c); i++) {
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c[i], &r.memory, HG_START_REST));
+    }
+    assert_status(HG_OK, hg_node_start(&r.self, &usual, &r.memory, HG_START_REST));
+}
+
+/* ---- frames into a node ---- */
+
+static void samples_follow_one_another_and_the_index_wraps(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    for (uint32_t k = 0U; k < 40U; k++) {
+        sample(&r, k, 10, 20, 10);
+        assert_int_equal(HG_PLANT_NONE, r.verdict.plant);
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 1U));
+        assert_int_equal(0, r.verdict.bus >> 4U);
+        assert_false(r.verdict.refused);
+    }
+    r.self.k = UINT32_MAX - 19U; /* ... 0xFFFFFFEC: four short of a multiple of 16 */
+    for (uint32_t i = 0U; i < 40U; i++) {
+        sample(&r, UINT32_MAX - 19U + i, 10, 20, 10);
+    }
+    const hg_link_health *health = hg_node_health(&r.self, 0U);
+    assert_int_equal(80, health->good);
+    assert_int_equal(0, health->lost + health->crc + health->format + health->repeated + health->early + health->late + health->numeric + health->invalid);
+    assert_count(0, r.self.unknown);
+    assert_count(0, r.self.overdue);
+}
+
+static void foreign_frames_are_not_ours(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    hg_can_frame frame = frame_of(&r, 0U, 0U, 0, 0);
+    frame.id = 0x102U;
+    assert_status(HG_E_ID, hg_node_receive(&r.self, &frame));
+    frame.id = 0x200U; /* our own verdict */
+    assert_status(HG_E_ID, hg_node_receive(&r.self, &frame));
+    frame.id = 0x101U;
+    frame.flags = HG_CAN_EXTENDED; /* the twin with 29 bits */
+    assert_status(HG_E_ID, hg_node_receive(&r.self, &frame));
+    assert_count(3, r.self.unknown);
+    r.self.unknown = UINT32_MAX;
+    assert_status(HG_E_ID, hg_node_receive(&r.self, &frame));
+    assert_true(r.self.unknown == UINT32_MAX);
+    sample(&r, 0U, 0, 0, 0);
+    assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+}
+
+static void a_frame_of_wrong_kind_or_length_is_refused_and_counts_as_lost(void **state)
+{
+    (void)state;
+    static rig r;
+    const uint8_t kinds[] = {HG_CAN_REMOTE, HG_CAN_FD, HG_CAN_ERROR};
+    uint16_t count = 0U;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 0, 0, 0);
+    for (uint32_t i = 0U; i < (COUNT(kinds) + 70U); i++) {
+        hg_can_frame frame = frame_of(&r, 0U, 1U, 0, 0);
+        r.counter[0]--;
+        if (i < COUNT(kinds)) {
+            frame.flags = kinds[i];
+        } else {
+            frame.length = (uint8_t)(i - COUNT(kinds));
+        }
+        if (frame.length == 6U && frame.flags == 0U) {
+            continue;
+        }
+        assert_status(HG_E_FORMAT, hg_node_receive(&r.self, &frame));
+        count++;
+        assert_int_equal(count, hg_node_health(&r.self, 0U)->format);
+    }
+    sample(&r, 1U, 0, 0, 0);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+    assert_int_equal(HG_BUS_GOOD, bus(&r, 1U));
+    sample(&r, 2U, 0, 0, 0);
+    assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+}
+
+static void a_damaged_frame_is_refused_and_counts_as_lost(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 0, 0, 0);
+    for (uint8_t group = 0U; group < SM_GROUPS; group++) {
+        hg_can_frame frame = frame_of(&r, group, 1U, 0, 0);
+        r.counter[group]--;
+        for (unsigned bit = 0U; bit < (8U * (unsigned)frame.length); bit++) {
+            hg_can_frame bad = frame;
+            bad.data[bit / 8U] ^= (uint8_t)(1U << (bit % 8U));
+            assert_status(HG_E_CRC, hg_node_receive(&r.self, &bad));
+        }
+        assert_int_equal(8 * frame.length, hg_node_health(&r.self, group)->crc);
+    }
+    sample(&r, 1U, 0, 0, 0);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 1U));
+}
+
+static void a_duplicate_is_counted_and_harmless(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    for (uint32_t k = 0U; k < 40U; k++) {
+        const hg_can_frame a = frame_of(&r, 0U, k, 1, 2);
+        const hg_can_frame b = frame_of(&r, 1U, k, 1, 0);
+        assert_status(HG_OK, hg_node_receive(&r.self, &a));
+        assert_status(HG_E_REPEATED, hg_node_receive(&r.self, &a));
+        assert_status(HG_OK, hg_node_receive(&r.self, &b));
+        assert_status(HG_E_BUSY, hg_node_receive(&r.self, &b));
+        step(&r, k);
+        assert_status(HG_E_REPEATED, hg_node_receive(&r.self, &b));
+        assert_status(HG_E_REPEATED, hg_node_receive(&r.self, &a));
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 1U));
+        nothing_is_due(&r);
+    }
+    assert_int_equal(80, hg_node_health(&r.self, 0U)->repeated);
+    assert_int_equal(40, hg_node_health(&r.self, 1U)->repeated);
+    assert_int_equal(0, hg_node_health(&r.self, 0U)->lost);
+}
+
+static void a_second_frame_of_one_sample_is_no_duplicate_but_a_loss(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 0, 0, 0);
+    assert_status(HG_OK, give(&r, 0U, 1U, 10, 10));
+    assert_status(HG_E_REPEATED, give(&r, 0U, 1U, 20, 20)); /* its counter moved on: its sender now goes by these codes */
+    assert_status(HG_OK, give(&r, 1U, 1U, 0, 0));
+    step(&r, 1U);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+    assert_status(HG_OK, give(&r, 1U, 2U, 0, 0));
+    step(&r, 2U);
+    assert_status(HG_OK, give(&r, 1U, 3U, 0, 0));
+    step(&r, 3U);
+    assert_real(SM_SLEW(2), r.self.detector.radius[0]); /* silence proves nothing */
+}
+
+static void a_measurement_of_another_sample_is_never_booked(void **state)
+{
+    (void)state;
+    for (uint32_t ahead = 1U; ahead < 16U; ahead++) {
+        static rig r;
+        begin(&r, HG_START_REST);
+        for (uint32_t k = 0U; k < 20U; k++) {
+            sample(&r, k, 0, 0, 0);
+        }
+        assert_status(HG_E_STAMP, give(&r, 0U, 20U + ahead, 500, 500));
+        assert_int_equal((ahead <= 7U) ? 1 : 0, hg_node_health(&r.self, 0U)->early);
+        assert_int_equal((ahead <= 7U) ? 0 : 1, hg_node_health(&r.self, 0U)->late);
+        assert_int_equal(20, hg_node_health(&r.self, 0U)->good);
+        assert_status(HG_OK, give(&r, 1U, 20U, 0, 0));
+        step(&r, 20U);
+        assert_real(0.0, r.self.detector.value[0]);
+        assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+        assert_real(SM_SLEW(1), r.self.detector.radius[0]);
+    }
+}
+
+static void lost_frames_are_counted_by_the_sequence(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 0, 0, 0);
+    r.counter[0] = (uint8_t)(r.counter[0] + 3U);
+    sample(&r, 1U, 0, 0, 0);
+    assert_int_equal(3, hg_node_health(&r.self, 0U)->lost);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+    sample(&r, 2U, 0, 0, 0);
+    assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+    r.link[0].health.lost = UINT16_MAX - 1U;
+    r.counter[0] = (uint8_t)(r.counter[0] + 14U);
+    sample(&r, 3U, 0, 0, 0);
+    assert_int_equal(UINT16_MAX, hg_node_health(&r.self, 0U)->lost);
+}
+
+static void a_missing_tick_is_a_step(void **state)
+{
+    (void)state;
+    for (uint32_t jump = 0U; jump <= 7U; jump++) {
+        static rig r;
+        begin(&r, HG_START_REST);
+        sample(&r, 0U, 0, 0, 0);
+        assert_status(HG_OK, give(&r, 0U, 1U, 8, 8)); /* belongs to the sample whose closing frame is missing */
+        r.counter[1] = (uint8_t)(r.counter[1] + jump);
+        assert_status(HG_OK, give(&r, 1U, 1U + jump, 8, 0));
+        for (uint32_t j = 0U; j <= jump; j++) {
+            const hg_can_frame early = {.id = 0x110U, .length = 4U};
+            const hg_node before = r.self;
+            assert_status(HG_E_BUSY, hg_node_receive(&r.self, &early));
+            assert_memory_equal(&before, &r.self, sizeof(before));
+            step(&r, 1U + j);
+            if (j == 0U) {
+                assert_real(8.0 * SM_RESOLUTION, r.self.detector.value[0]);
+                assert_real(SM_HALF, r.self.detector.radius[0]);
+            }
+            if (j == jump) {
+                assert_real(8.0 * SM_RESOLUTION, r.self.detector.value[2]);
+                assert_real(SM_HALF, r.self.detector.radius[2]);
+            } else {
+                assert_real((j < 4U) ? SM_SLEW((double)j + 1.0) : R(SM_SPAN), r.self.detector.radius[2]);
+            }
+        }
+        nothing_is_due(&r);
+        assert_count(jump, r.self.overdue);
+        assert_int_equal((jump == 0U) ? HG_BUS_GOOD : HG_BUS_LOSSY, bus(&r, 1U));
+        assert_int_equal(jump, hg_node_health(&r.self, 1U)->lost);
+    }
+}
+
+static void one_late_tick_is_a_straggler(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    for (uint32_t k = 0U; k < 3U; k++) {
+        sample(&r, k, 0, 0, 0);
+    }
+    for (uint32_t i = 0U; i < 5U; i++) {
+        assert_status(HG_E_STAMP, give(&r, 1U, 2U + i, 0, 0));
+        nothing_is_due(&r);
+        sample(&r, 3U + i, 0, 0, 0);
+        assert_int_equal(HG_BUS_LOSSY, bus(&r, 1U));
+    }
+    assert_int_equal(5, hg_node_health(&r.self, 1U)->late);
+    assert_count(0, r.self.overdue);
+}
+
+static void two_late_ticks_restart_with_nothing_known(void **state)
+{
+    (void)state;
+    for (uint32_t ahead = 8U; ahead < 16U; ahead++) {
+        static rig r;
+        begin(&r, HG_START_REST);
+        for (uint32_t k = 0U; k < 5U; k++) {
+            sample(&r, k, 640, 640, 640);
+        }
+        assert_status(HG_OK, give(&r, 0U, 5U, 640, 640)); /* of the sample that this node believed to be open */
+        r.counter[1] = (uint8_t)(r.counter[1] + (ahead / 2U)); /* 15 lost would read as a repetition first */
+        assert_status(HG_E_STAMP, give(&r, 1U, 5U + ahead, 0, 0));
+        assert_status(HG_OK, give(&r, 1U, 5U + ahead, 0, 0));
+        step(&r, 5U + ahead); /* forward only */
+        nothing_is_due(&r);
+        assert_int_equal(HG_PLANT_STARTING, r.verdict.plant);
+        /* Up to 15 samples may have passed: neither the frame just booked nor an older one says anything of this sample. */
+        assert_real(SM_SPAN, r.self.detector.radius[0]);
+        assert_real(SM_SPAN, r.self.detector.radius[1]);
+        assert_real(SM_HALF, r.self.detector.radius[2]);
+        assert_int_equal(HG_BUS_ABSENT, bus(&r, 0U));
+        assert_int_equal(2, hg_node_health(&r.self, 1U)->late);
+        sample(&r, 6U + ahead, 0, 0, 0);
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 1U));
+        sample(&r, 7U + ahead, 0, 0, 0);
+        sample(&r, 8U + ahead, 0, 0, 0);
+        assert_int_equal(HG_PLANT_NONE, r.verdict.plant);
+    }
+}
+
+static void a_moving_start_waits_for_the_sample_index(void **state)
+{
+    (void)state;
+    for (uint32_t stamp = 0U; stamp < 16U; stamp++) {
+        static rig r;
+        begin(&r, HG_START_MOVING);
+        assert_status(HG_E_STAMP, give(&r, 0U, 0U, 5, 5)); /* even with the stamp of the sample that happens to be open */
+        assert_status(HG_E_STAMP, give(&r, 0U, 9U, 5, 5));
+        assert_int_equal(1, hg_node_health(&r.self, 0U)->early);
+        assert_int_equal(1, hg_node_health(&r.self, 0U)->late);
+        nothing_is_due(&r);
+        assert_status(HG_OK, give(&r, 1U, stamp, 5, 0));
+        step(&r, stamp);
+        nothing_is_due(&r);
+        assert_int_equal(HG_PLANT_STARTING, r.verdict.plant);
+        assert_int_equal(HG_BUS_ABSENT, bus(&r, 0U));
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 1U));
+        sample(&r, stamp + 1U, 5, 5, 5);
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+        sample(&r, stamp + 2U, 5, 5, 5);
+        assert_int_equal(HG_PLANT_NONE, r.verdict.plant);
+    }
+}
+
+static void the_sample_index_never_goes_back(void **state)
+{
+    (void)state;
+    for (uint32_t stamp = 0U; stamp < 16U; stamp++) {
+        static rig r;
+        begin(&r, HG_START_MOVING);
+        for (uint32_t k = 0U; k < 21U; k++) {
+            hg_node_overdue(&r.self);
+            step(&r, k);
+        }
+        assert_status(HG_OK, give(&r, 1U, stamp, 5, 0));
+        step(&r, 21U + ((stamp - 21U) & 15U));
+    }
+}
+
+static void an_overdue_tick_is_one_step_however_often_said(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 0, 0, 0);
+    hg_node_overdue(&r.self);
+    hg_node_overdue(&r.self);
+    step(&r, 1U);
+    nothing_is_due(&r);
+    assert_count(1, r.self.overdue);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 1U));
+    assert_real(SM_SLEW(1), r.self.detector.radius[2]);
+    assert_status(HG_E_STAMP, give(&r, 1U, 1U, 0, 0)); /* it comes at last */
+    sample(&r, 2U, 0, 0, 0);
+    /* with steps due already, overdue adds none */
+    r.counter[1] = (uint8_t)(r.counter[1] + 2U);
+    assert_status(HG_OK, give(&r, 1U, 5U, 0, 0));
+    hg_node_overdue(&r.self);
+    for (uint32_t k = 3U; k <= 5U; k++) {
+        step(&r, k);
+    }
+    nothing_is_due(&r);
+    r.self.overdue = UINT32_MAX;
+    hg_node_overdue(&r.self);
+    step(&r, 6U);
+    assert_true(r.self.overdue == UINT32_MAX);
+}
+
+static void numbers_out_of_range_are_refused_and_told(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 0, 0, 0);
+    assert_false(r.verdict.refused);
+    hg_can_frame bad = frame_of(&r, 0U, 1U, 0, 0);
+    bad.data[3] = 0x7FU; /* 32512: a number, but outside the range */
+    assert_status(HG_OK, hg_e2e_p22_protect(bad.data, 6U, ids[0], bad.data[1], 1U));
+    assert_status(HG_E_NUMERIC, hg_node_receive(&r.self, &bad));
+    assert_int_equal(1, hg_node_health(&r.self, 0U)->numeric);
+    assert_status(HG_OK, give(&r, 1U, 1U, HG_CODE_INVALID, 0));
+    step(&r, 1U);
+    assert_true(r.verdict.refused);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+    assert_real(0.0, r.self.detector.value[0]);
+    assert_int_equal(1, hg_node_health(&r.self, 1U)->invalid);
+    assert_real(SM_SPAN, r.self.detector.radius[2]);
+    sample(&r, 2U, 0, 0, 0);
+    assert_true(r.verdict.refused); /* since the start */
+    r.link[0].health.numeric = 0U;
+    r.self.detector.refusals = 1U;
+    sample(&r, 3U, 0, 0, 0);
+    assert_true(r.verdict.refused);
+}
+
+/* Message and hold may be given different scales by a careless table: the narrower one decides. */
+static void a_code_that_only_the_message_allows_is_refused(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_code_scale narrow[2] = {sm_scale[0], sm_scale[1]};
+    narrow[0].maximum = 100;
+    hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
+    hold[0].scale = narrow;
+    hg_detector_config d = sm_detector;
+    d.hold = hold;
+    hg_node_config c = usual;
+    c.detector = &d;
+    begin_with(&r, &c, HG_START_REST);
+    assert_status(HG_OK, give(&r, 0U, 0U, 100, 200));
+    assert_status(HG_OK, give(&r, 1U, 0U, 100, 0));
+    step(&r, 0U);
+    assert_status(HG_E_NUMERIC, give(&r, 0U, 1U, 101, 200));
+    assert_int_equal(1, hg_node_health(&r.self, 0U)->numeric);
+    assert_status(HG_OK, give(&r, 1U, 1U, 100, 0));
+    step(&r, 1U);
+    assert_true(r.verdict.refused);
+    assert_int_equal(HG_BUS_LOSSY, bus(&r, 0U));
+}
+
+static void health_counters_saturate(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    (void)memset(&r.link[0].health, 0xFF, sizeof(r.link[0].health));
+    hg_can_frame bad = frame_of(&r, 0U, 0U, 0, 0);
+    r.counter[0]--;
+    bad.length = 8U;
+    assert_status(HG_E_FORMAT, hg_node_receive(&r.self, &bad));
+    bad.length = 6U;
+    bad.data[0] ^= 1U;
+    assert_status(HG_E_CRC, hg_node_receive(&r.self, &bad));
+    assert_status(HG_E_STAMP, give(&r, 0U, 1U, 0, 0));
+    assert_status(HG_E_STAMP, give(&r, 0U, 9U, 0, 0));
+    const hg_can_frame good = frame_of(&r, 0U, 0U, HG_CODE_INVALID, 0);
+    assert_status(HG_OK, hg_node_receive(&r.self, &good));
+    assert_status(HG_E_REPEATED, hg_node_receive(&r.self, &good));
+    r.counter[0] = (uint8_t)(r.counter[0] + 5U);
+    assert_status(HG_E_REPEATED, give(&r, 0U, 0U, 0, 0));
+    hg_link_health full;
+    (void)memset(&full, 0xFF, sizeof(full));
+    assert_memory_equal(&full, hg_node_health(&r.self, 0U), sizeof(full));
+}
+
+static void two_nodes_share_tables_and_nothing_else(void **state)
+{
+    (void)state;
+    static rig a;
+    static rig b;
+    begin(&a, HG_START_REST);
+    begin(&b, HG_START_MOVING);
+    for (uint32_t k = 0U; k < 20U; k++) {
+        sample(&a, k, 1, 1, 1);
+        assert_status(HG_OK, give(&b, 1U, k, 3000, 0));
+        step(&b, k);
+        assert_int_equal(HG_PLANT_NONE, a.verdict.plant);
+        assert_int_equal(HG_BUS_GOOD, bus(&a, 0U));
+        assert_int_equal(HG_BUS_ABSENT, bus(&b, 0U));
+    }
+}
+
+/* ---- verdicts out of a node ---- */
+
+static hg_verdict verdict_of(uint32_t k)
+{
+    return (hg_verdict){.k = k, .model_hash = HASH, .candidates = 0U, .plant = HG_PLANT_NONE, .basis = HG_BASIS_SET, .bus = 5U, .refused = false};
+}
+
+static uint8_t report(rig *r, const hg_verdict *verdict, bool reply, hg_can_frame frame[3])
+{
+    (void)memset(frame, 0x5A, 3U * sizeof(frame[0]));
+    hg_can_frame untouched;
+    (void)memset(&untouched, 0x5A, sizeof(untouched));
+    const uint8_t frames = hg_node_report(&r->self, verdict, reply, frame);
+    for (uint8_t i = frames; i < 3U; i++) {
+        assert_memory_equal(&untouched, &frame[i], sizeof(untouched));
+    }
+    return frames;
+}
+
+static void the_first_verdict_is_told_with_the_status(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_can_frame frame[3];
+    begin(&r, HG_START_REST);
+    const hg_verdict v = verdict_of(0U);
+    assert_int_equal(2, report(&r, &v, true, frame));
+    assert_count(0x200, frame[0].id);
+    assert_count(0x201, frame[1].id);
+    assert_int_equal(0, frame[0].data[2] & 0x10); /* it would have been sent without being asked */
+}
+
+static void the_verdict_frame_has_the_documented_bytes(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_can_frame frame[3];
+    begin(&r, HG_START_REST);
+    const hg_verdict v = {.k = 0xFFFF5ABCUL, .model_hash = HASH, .candidates = 0x8421U, .plant = HG_PLANT_CONFIRMED, .basis = HG_BASIS_STATISTICAL, .bus = 0x1234U, .refused = true};
+    r.link[0].health = (hg_link_health){.lost = 3U, .crc = 1U, .format = 2U, .early = 4U, .late = 8U, .numeric = 16U, .repeated = 99U, .invalid = 99U, .good = 99U};
+    r.link[1].health = (hg_link_health){.lost = 4U, .crc = 32U};
+    assert_int_equal(2, report(&r, &v, false, frame));
+    const uint8_t expected[7] = {0xC0U, 0x2BU, 0x21U, 0x84U, 0x34U, 0x12U, 0xABU};
+    assert_memory_equal(expected, &frame[0].data[1], 7U);
+    assert_int_equal(hg_e2e_p22_crc(frame[0].data, 8U, ids[2]), frame[0].data[0]);
+    assert_int_equal(8, frame[0].length);
+    assert_int_equal(0, frame[0].flags);
+    const uint8_t told[7] = {0xC0U, 0xEFU, 0xCDU, 0xABU, 0x89U, 7U, 63U};
+    assert_memory_equal(told, &frame[1].data[1], 7U);
+    assert_int_equal(hg_e2e_p22_crc(frame[1].data, 8U, ids[3]), frame[1].data[0]);
+    (void)memset(&r.link[1].health, 0xFF, sizeof(r.link[1].health));
+    for (uint32_t i = 0U; i < HEARTBEAT; i++) {
+        (void)report(&r, &v, false, frame);
+    }
+    assert_int_equal(255, frame[1].data[6]);
+    assert_int_equal(255, frame[1].data[7]);
+    assert_int_equal(0xC1, frame[1].data[1]);
+}
+
+static void a_heartbeat_comes_when_nothing_changes(void **state)
+{
+    (void)state;
+    const uint16_t beats[] = {1U, 2U, HEARTBEAT, 300U, UINT16_MAX};
+    for (size_t b = 0U; b < COUNT(beats); b++) {
+        static rig r;
+        hg_can_frame frame[3];
+        hg_node_config c = usual;
+        c.heartbeat = beats[b];
+        begin_with(&r, &c, HG_START_REST);
+        for (uint32_t k = 0U; k < 140000U; k++) {
+            const hg_verdict v = verdict_of(k);
+            assert_int_equal(((k % beats[b]) == 0U) ? 2 : 0, report(&r, &v, false, frame));
+        }
+    }
+}
+
+static void every_change_is_told_at_once(void **state)
+{
+    (void)state;
+    for (int what = 0; what < 5; what++) {
+        static rig r;
+        hg_can_frame frame[3];
+        begin(&r, HG_START_REST);
+        hg_verdict v = verdict_of(0U);
+        (void)report(&r, &v, false, frame);
+        v = verdict_of(1U);
+        assert_int_equal(0, report(&r, &v, false, frame));
+        v = verdict_of(2U);
+        if (what == 0) {
+            v.plant = HG_PLANT_PROVISIONAL;
+        } else if (what == 1) {
+            v.candidates = 4U;
+        } else if (what == 2) {
+            v.basis = HG_BASIS_STATISTICAL;
+        } else if (what == 3) {
+            v.bus = 6U;
+        } else {
+            v.refused = true;
+        }
+        assert_int_equal(1, report(&r, &v, false, frame));
+        assert_int_equal(0, frame[0].data[2] & 0x10);
+        for (uint32_t k = 3U; k < 7U; k++) {
+            v.k = k;
+            assert_int_equal(0, report(&r, &v, false, frame)); /* the heartbeat counts from there */
+        }
+        v.k = 7U;
+        assert_int_equal(2, report(&r, &v, false, frame));
+        v = verdict_of(8U); /* and back */
+        assert_int_equal(1, report(&r, &v, false, frame));
+    }
+}
+
+static void a_reply_is_marked_and_shifts_no_heartbeat(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_can_frame frame[3];
+    begin(&r, HG_START_REST);
+    for (uint32_t k = 0U; k < 50U; k++) {
+        const hg_verdict v = verdict_of(k);
+        const bool beat = (k % HEARTBEAT) == 0U;
+        assert_int_equal(beat ? 2 : 1, report(&r, &v, true, frame));
+        assert_int_equal(beat ? 0 : 0x10, frame[0].data[2] & 0x10);
+        assert_int_equal((int)(k & 15U), frame[0].data[1] & 15); /* the counter moves with every frame */
+    }
+}
+
+static void a_verdict_reads_back_as_written(void **state)
+{
+    (void)state;
+    uint32_t random = seed_of_run(61U);
+    static rig r;
+    begin(&r, HG_START_REST);
+    for (int i = 0; i < 2000; i++) {
+        hg_can_frame frame[3];
+        const hg_verdict v = {.k = draw(&random), .model_hash = HASH, .candidates = draw(&random) & 0xFFFFU, .plant = (hg_plant)(draw(&random) & 3U),
+                              .basis = (hg_basis)(draw(&random) % 3U), .bus = (uint16_t)(draw(&random) & 0xFFFFU), .refused = (draw(&random) & 1U) != 0U};
+        hg_verdict back;
+        bool reply = false;
+        const uint8_t frames = hg_node_report(&r.self, &v, true, frame);
+        assert_true(frames >= 1U);
+        assert_status(HG_OK, hg_verdict_read(&verdict_message, &frame[0], &back, &reply));
+        assert_true(back.k == (v.k & 0xFFFU));
+        assert_true(back.candidates == v.candidates);
+        assert_int_equal(v.plant, back.plant);
+        assert_int_equal(v.basis, back.basis);
+        assert_int_equal(v.bus, back.bus);
+        assert_int_equal(v.refused, back.refused);
+        assert_count(0, back.model_hash);
+        assert_int_equal((frame[0].data[2] & 0x10) != 0, reply);
+    }
+}
+
+static void a_verdict_that_is_none_is_refused(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_can_frame frame[3];
+    hg_verdict back;
+    hg_verdict before;
+    bool reply = true;
+    begin(&r, HG_START_REST);
+    const hg_verdict v = verdict_of(0U);
+    (void)report(&r, &v, false, frame);
+    (void)memset(&back, 0x5A, sizeof(back));
+    (void)memcpy(&before, &back, sizeof(back));
+    hg_can_frame bad = frame[0];
+    bad.flags = HG_CAN_REMOTE;
+    assert_status(HG_E_FORMAT, hg_verdict_read(&verdict_message, &bad, &back, &reply));
+    assert_status(HG_E_FORMAT, hg_verdict_read(&verdict_message, &frame[1], &back, &reply));
+    hg_message seven = verdict_message;
+    seven.length = 7U;
+    bad = frame[0];
+    bad.length = 7U;
+    assert_status(HG_E_FORMAT, hg_verdict_read(&seven, &bad, &back, &reply));
+    for (unsigned bit = 0U; bit < 64U; bit++) {
+        bad = frame[0];
+        bad.data[bit / 8U] ^= (uint8_t)(1U << (bit % 8U));
+        assert_status(HG_E_CRC, hg_verdict_read(&verdict_message, &bad, &back, &reply));
+    }
+    assert_memory_equal(&before, &back, sizeof(back));
+    assert_true(reply);
+}
+
+/* ---- inbox ---- */
+
+static void an_inbox_has_a_length_that_divides_its_counters(void **state)
+{
+    (void)state;
+    static hg_can_frame room[128];
+    hg_inbox self;
+    for (uint32_t length = 0U; length < 256U; length++) {
+        const bool good = (length == 2U) || (length == 4U) || (length == 8U) || (length == 16U) || (length == 32U) || (length == 64U) || (length == 128U);
+        assert_status(good ? HG_OK : HG_E_ARGUMENT, hg_inbox_start(&self, room, (uint8_t)length));
+    }
+    assert_status(HG_E_ARGUMENT, hg_inbox_start(NULL, room, 2U));
+    assert_status(HG_E_ARGUMENT, hg_inbox_start(&self, NULL, 2U));
+}
+
+static void an_inbox_hands_out_in_order_and_counts_what_found_no_room(void **state)
+{
+    (void)state;
+    uint32_t random = seed_of_run(71U);
+    for (uint32_t length = 2U; length <= 128U; length *= 2U) {
+        static hg_can_frame room[129];
+        hg_inbox self;
+        hg_can_frame frame;
+        uint32_t put = 0U;
+        uint32_t got = 0U;
+        uint32_t dropped = 0U;
+        (void)memset(room, 0x5A, sizeof(room));
+        assert_status(HG_OK, hg_inbox_start(&self, room, (uint8_t)length));
+        (void)memset(&frame, 0x77, sizeof(frame));
+        assert_status(HG_E_EMPTY, hg_inbox_get(&self, &frame));
+        assert_true(frame.id == 0x77777777UL);
+        for (int i = 0; i < 5000; i++) {
+            const int32_t burst = draw_between(&random, 0, (int32_t)length + 2);
+            const bool filling = (draw(&random) & 1U) != 0U;
+            for (int32_t j = 0; j < burst; j++) {
+                if (filling) {
+                    frame = (hg_can_frame){.id = put};
+                    const bool room_left = (put - got) < length;
+                    assert_status(room_left ? HG_OK : HG_E_BUSY, hg_inbox_put(&self, &frame));
+                    put += room_left ? 1U : 0U;
+                    dropped += room_left ? 0U : 1U;
+                } else {
+                    const bool some = put != got;
+                    assert_status(some ? HG_OK : HG_E_EMPTY, hg_inbox_get(&self, &frame));
+                    if (some) {
+                        assert_count(got, frame.id);
+                        got++;
+                    }
+                }
+            }
+            assert_count((dropped < UINT16_MAX) ? dropped : UINT16_MAX, self.overflow);
+        }
+        for (size_t i = length; i < COUNT(room); i++) {
+            assert_true(room[i].id == 0x5A5A5A5AUL);
+        }
+        assert_true(got > 256U);
+        assert_true(dropped > 0U);
+    }
+}
+
+static void the_overflow_counter_saturates(void **state)
+{
+    (void)state;
+    hg_can_frame room[2];
+    hg_inbox self;
+    const hg_can_frame frame = {.id = 1U};
+    assert_status(HG_OK, hg_inbox_start(&self, room, 2U));
+    assert_status(HG_OK, hg_inbox_put(&self, &frame));
+    assert_status(HG_OK, hg_inbox_put(&self, &frame));
+    for (uint32_t i = 1U; i < 70000U; i++) {
+        assert_status(HG_E_BUSY, hg_inbox_put(&self, &frame));
+        assert_count((i < UINT16_MAX) ? i : UINT16_MAX, self.overflow);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sender_refuses_null_and_contradictions),
+        cmocka_unit_test(a_sender_stamps_counts_and_protects_what_it_sends),
+        cmocka_unit_test(a_silent_sender_leaves_the_frame_and_its_counter_alone),
+        cmocka_unit_test(what_cannot_be_sent_goes_out_as_invalid),
+        cmocka_unit_test(a_node_refuses_null),
+        cmocka_unit_test(a_node_refuses_contradictions),
+        cmocka_unit_test(samples_follow_one_another_and_the_index_wraps),
+        cmocka_unit_test(foreign_frames_are_not_ours),
+        cmocka_unit_test(a_frame_of_wrong_kind_or_length_is_refused_and_counts_as_lost),
+        cmocka_unit_test(a_damaged_frame_is_refused_and_counts_as_lost),
+        cmocka_unit_test(a_duplicate_is_counted_and_harmless),
+        cmocka_unit_test(a_second_frame_of_one_sample_is_no_duplicate_but_a_loss),
+        cmocka_unit_test(a_measurement_of_another_sample_is_never_booked),
+        cmocka_unit_test(lost_frames_are_counted_by_the_sequence),
+        cmocka_unit_test(a_missing_tick_is_a_step),
+        cmocka_unit_test(one_late_tick_is_a_straggler),
+        cmocka_unit_test(two_late_ticks_restart_with_nothing_known),
+        cmocka_unit_test(a_moving_start_waits_for_the_sample_index),
+        cmocka_unit_test(the_sample_index_never_goes_back),
+        cmocka_unit_test(an_overdue_tick_is_one_step_however_often_said),
+        cmocka_unit_test(numbers_out_of_range_are_refused_and_told),
+        cmocka_unit_test(a_code_that_only_the_message_allows_is_refused),
+        cmocka_unit_test(health_counters_saturate),
+        cmocka_unit_test(two_nodes_share_tables_and_nothing_else),
+        cmocka_unit_test(the_first_verdict_is_told_with_the_status),
+        cmocka_unit_test(the_verdict_frame_has_the_documented_bytes),
+        cmocka_unit_test(a_heartbeat_comes_when_nothing_changes),
+        cmocka_unit_test(every_change_is_told_at_once),
+        cmocka_unit_test(a_reply_is_marked_and_shifts_no_heartbeat),
+        cmocka_unit_test(a_verdict_reads_back_as_written),
+        cmocka_unit_test(a_verdict_that_is_none_is_refused),
+        cmocka_unit_test(an_inbox_has_a_length_that_divides_its_counters),
+        cmocka_unit_test(an_inbox_hands_out_in_order_and_counts_what_found_no_room),
+        cmocka_unit_test(the_overflow_counter_saturates),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
