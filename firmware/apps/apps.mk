@@ -25,5 +25,5 @@ $(BUILD)/bin/%_node_f64: $(BUILD)/apps-f64/firmware/apps/%_node.o $(APPS_OBJECTS
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $^
 
-.SECONDARY: $(BUILD)/apps-f32/firmware/apps/detector_node.o $(BUILD)/apps-f64/firmware/apps/detector_node.o
--include $(APPS_OBJECTS_f32:.o=.d) $(APPS_OBJECTS_f64:.o=.d) $(wildcard $(BUILD)/apps-*/firmware/apps/*.d)
+.SECONDARY: $(APPS_OBJECTS_f32) $(APPS_OBJECTS_f64) $(foreach r,f32 f64,$(BUILD)/apps-$(r)/firmware/apps/detector_node.o)
+-include $(wildcard $(BUILD)/apps-f32/*/*.d $(BUILD)/apps-f32/*/*/*.d $(BUILD)/apps-f64/*/*.d $(BUILD)/apps-f64/*/*/*.d)

@@ -74,7 +74,8 @@ static const char usage[] =
     "  --model NAME       model to run (platoon)\n"
     "  --interface NAME   CAN interface (vcan0)\n"
     "  --lockstep         answer every closing frame with a verdict, use no timer\n"
-    "  --rest             the plant starts within its initial range; without it, anywhere in its operating range\n"
+    "  --rest             the plant starts within its initial range at sample 0, which is waited for; without it, the plant may be\n"
+    "                     anywhere in its operating range, and a bus without closing frames is reported from the start\n"
     "  --period MS        time between two closing frames (the model's sample time)\n"
     "  --deadline MS      how much later a closing frame may be before the sample is closed without it (half the period)\n"
     "  --samples N        stop after N samples (0: never)\n"
@@ -171,7 +172,6 @@ static int take_option(options *self, int option, const char *value)
         (void)printf("detector_node %s (%s)\n", VERSION, real_name());
         return EXIT_SUCCESS;
     default:
-        (void)fprintf(stderr, "detector_node: see detector_node --help\n"); /* getopt has named the option */
         return EXIT_INPUT;
     }
 }
@@ -188,10 +188,19 @@ static int read_options(options *self, int argc, char **argv)
     };
     *self = (options){.model = app_model_at(0U), .interface = "vcan0", .how = HG_START_MOVING, .slack_us = UINT64_MAX};
     int result = -1;
-    int option = getopt_long(argc, argv, "", known, NULL);
+    int option = 0;
+    opterr = 0; /* errors are told here, in the words of all others */
     while ((result == -1) && (option != -1)) {
-        result = take_option(self, option, optarg);
-        option = (result == -1) ? getopt_long(argc, argv, "", known, NULL) : -1;
+        option = getopt_long(argc, argv, ":", known, NULL);
+        if (option == '?') {
+            result = refuse("option", argv[optind - 1], "unknown; see detector_node --help");
+        } else if (option == ':') {
+            result = refuse("option", argv[optind - 1], "needs a value; see detector_node --help");
+        } else if (option != -1) {
+            result = take_option(self, option, optarg);
+        } else {
+            /* all read */
+        }
     }
     if ((result == -1) && (optind < argc)) {
         result = refuse("argument", argv[optind], "not expected; see detector_node --help");

@@ -178,7 +178,7 @@ def run_run(args: argparse.Namespace) -> int:
     faults = the_faults(args, model, scenario.faults, samples)
     native = Native(library(args.real), made.tables)
     source = Plant(native, made, scenario.reference, faults, args.seed)
-    return _drive(args, made, native, source, samples, faults, scenario.name)
+    return _drive(args, made, native, source, samples, faults, scenario.name, REST)
 
 
 def run_replay(args: argparse.Namespace) -> int:
@@ -189,10 +189,10 @@ def run_replay(args: argparse.Namespace) -> int:
     faults = the_faults(args, model, (), samples)
     native = Native(library(args.real), made.tables)
     source = Recording(native, model, series, args.noise, faults, args.seed)
-    return _drive(args, made, native, source, samples, faults, Path(args.csv).name)
+    return _drive(args, made, native, source, samples, faults, Path(args.csv).name, MOVING)
 
 
-def _drive(args: argparse.Namespace, made: Design, native: Native, source: Source, samples: int, faults: list[FaultSpec], scenario: str) -> int:
+def _drive(args: argparse.Namespace, made: Design, native: Native, source: Source, samples: int, faults: list[FaultSpec], scenario: str, start: int) -> int:
     """Find the bus, run, write what was asked for, judge."""
     options = bus_options(args)
     if not options and args.bus == "auto" and choose.existing_vcan() is None and choose.launcher() is not None and INSIDE not in os.environ:
@@ -200,11 +200,11 @@ def _drive(args: argparse.Namespace, made: Design, native: Native, source: Sourc
     out = Path(args.out) if args.out else None
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-    with _bus(args, made, native, options) as (bus, pace, name):
+    with _bus(args, made, native, options, start) as (bus, pace, name):
         say(args, f"bus: {name}")
         log = candump.Writer(out / "run.log", name.split()[0] if not isinstance(bus, InProcess) else "vcan0") if out else None
         try:
-            trace, mismatch = _loop(args, made, native, source, samples, bus, pace, log)
+            trace, mismatch = _loop(args, made, source, samples, Run(made, native, bus, pace, log, start))
         finally:
             if log is not None:
                 log.close()
@@ -240,12 +240,9 @@ def _report(args: argparse.Namespace, out: Path) -> None:
     say(args, f"report: {write_run_report(out)}")
 
 
-def _loop(
-    args: argparse.Namespace, made: Design, native: Native, source: Source, samples: int, bus: Bus, pace: Pace, log: candump.Writer | None
-) -> tuple[Trace, str | None]:
+def _loop(args: argparse.Namespace, made: Design, source: Source, samples: int, run: Run) -> tuple[Trace, str | None]:
     from hullguard.report.live import LiveTable
 
-    run = Run(made, native, bus, pace, log)
     if args.json or args.quiet:
         return run.samples(source, samples), run.mismatch
     with LiveTable(made, samples) as table:
@@ -253,7 +250,7 @@ def _loop(
         def watch(k: int, trace: Trace) -> None:
             ratios = [abs(r) / J for r, J in zip(trace.r[-1], trace.J[-1], strict=True)]
             v = trace.verdict[-1]
-            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, dict(zip((g.name for g in native.tables.groups), v.bus, strict=True)), trace.counts["measurement"])
+            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, dict(zip((g.name for g in made.tables.groups), v.bus, strict=True)), trace.counts["measurement"])
 
         return run.samples(source, samples, watch), run.mismatch
 
@@ -265,7 +262,7 @@ def bus_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any]) -> Iterator[tuple[Bus, Pace, str]]:
+def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any], start: int) -> Iterator[tuple[Bus, Pace, str]]:
     """The bus of a run, with a detector node at its other end."""
     pace = Pace(True) if args.speed == "max" else Pace(False, _speed(args.speed))
     if not options and args.bus == "auto":
@@ -282,7 +279,7 @@ def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[s
         raise BusError("a virtual bus lives inside one process and has no second end; use --bus inprocess")
     if any(m.flags & candump.FD for m in [g.message for g in native.tables.groups]):
         options.setdefault("fd", True)
-    with opened(**options) as link, _node(args, made, native, options, pace.lockstep):
+    with opened(**options) as link, _node(args, made, options, pace.lockstep, start):
         name = choose.describe(str(options.get("channel"))) if options.get("interface") == "socketcan" else f"{options.get('interface')}:{options.get('channel')}"
         yield OnCan(link, native, pace), pace, name
 
@@ -297,16 +294,17 @@ def _speed(text: str) -> float:
     return speed
 
 
-def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any], lockstep: bool) -> list[str]:
+def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any], lockstep: bool, start: int) -> list[str]:
     """The C node where it has this very model compiled in, otherwise the same library behind python-can."""
+    flags = (["--lockstep"] if lockstep else []) + (["--rest"] if start == REST else [])
     if options.get("interface") == "socketcan" and args.real in ("f32", "f64"):
         binary = choose.NODE if args.real == "f32" else choose.NODE.with_name("detector_node_f64")
         if binary.is_file():
             listed = subprocess.run([str(binary), "--list"], capture_output=True, text=True, check=False).stdout.split("\n")
             if f"{made.model.name} {made.tables.hash:08x}" in listed:
-                command = [str(binary), "--model", made.model.name, "--interface", str(options["channel"]), "--rest"]
-                return command + (["--lockstep"] if lockstep else [])
-    command = [sys.executable, "-m", "hullguard", "detect", args.model, "--rest", "--quiet", "--ready", "--real", args.real]
+                command = [str(binary), "--model", made.model.name, "--interface", str(options["channel"])]
+                return command + flags
+    command = [sys.executable, "-m", "hullguard", "detect", args.model, "--quiet", "--ready", "--real", args.real]
     command += [x for text in args.set for x in ("--set", text)] + (["--scenario", args.scenario] if getattr(args, "scenario", None) else [])
     for key, value in options.items():
         if key == "fd":
@@ -315,13 +313,13 @@ def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any]
             command += [f"--{key.replace('_', '-')}", str(value)]
         else:
             command += ["--bus-kwargs", f"{key}={value}"]
-    return command + (["--lockstep"] if lockstep else [])
+    return command + flags
 
 
 @contextlib.contextmanager
-def _node(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any], lockstep: bool) -> Iterator[None]:
+def _node(args: argparse.Namespace, made: Design, options: dict[str, Any], lockstep: bool, start: int) -> Iterator[None]:
     """A detector node as a process of its own, ready before the first frame and ended after the last."""
-    command = node_command(args, made, options, lockstep)
+    command = node_command(args, made, options, lockstep, start)
     say(args, f"node: {Path(command[0]).name if 'hullguard' not in command else 'hullguard detect'}, a process of its own")
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     try:

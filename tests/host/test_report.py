@@ -16,14 +16,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
+
 from hullguard.design.design import Design, design
 from hullguard.errors import InputError
 from hullguard.model.schema import load_model
 from hullguard.report.design_report import write_design_report
 from hullguard.report.live import LiveTable
-from hullguard.report.run_report import headline, write_picture, write_run_report
 from hullguard.report.run_data import read_run
-from rich.console import Console
+from hullguard.report.run_report import headline, write_picture, write_run_report
 
 VOID = {"meta", "br", "hr", "img", "link", "input", "col"}
 
@@ -235,7 +236,16 @@ def test_small_run(tmp_path: Path) -> None:
     assert path.stat().st_size < 1_000_000
     text, seen = check_html(path)
     f = info["faults"][0]
-    for expected in (info["model"], info["model_hash"], f["spec"], "k = 150", f"k = {f['detected_at']}", f"{f['delay']} samples", "0 confirmed, 0 provisional", "alarm above 1"):
+    for expected in (
+        info["model"],
+        info["model_hash"],
+        f["spec"],
+        "k = 150",
+        f"k = {f['detected_at']}",
+        f"found {f['delay']} samples",
+        "0 confirmed, 0 provisional",
+        "alarm above 1",
+    ):
         assert expected in text
     assert f"{info['margin_max']:.3g}" in text
     assert f"{100 * info['per_group']['measurement']['frames'] / 300:.3g} %" in text
@@ -264,7 +274,7 @@ def test_large_run(tmp_path: Path) -> None:
     assert time.monotonic() - began < 30  # 15 s on a free machine
     assert path.stat().st_size < 3_000_000
     text, seen = check_html(path)
-    assert "10 residuals not drawn here (5 whole generators)" in text
+    assert "10 residuals not drawn here (5 generators as a whole)" in text
     assert "Around fault F1" in text
     assert "18 residuals of 9 generators" in text
     assert seen.counts["svg"] == 8
@@ -359,7 +369,10 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "no UTF-8": (lambda d: _put(d / "signals.csv", b"\xff\xfe\x00"), r"signals\.csv: not UTF-8"),
     "empty csv": (lambda d: _put(d / "signals.csv", ""), r"signals\.csv: empty"),
     "only names": (edit_csv(lambda lines: lines[:1]), r"signals\.csv: no samples"),
-    "word in csv": (edit_csv(lambda lines: lines[:5] + [lines[5].replace(",", ",abc", 1)] + lines[6:]), r"signals\.csv: line 6, column 'k': 'abc5?4?' is not a number"),
+    "word in csv": (
+        edit_csv(lambda lines: lines[:5] + [lines[5].replace(",", ",abc", 1)] + lines[6:]),
+        r"signals\.csv: line 6, column 'k': 'abc5?4?' is not a number",
+    ),
     "short line": (edit_csv(lambda lines: lines[:5] + [lines[5].rpartition(",")[0]] + lines[6:]), r"signals\.csv: line 6 has \d+ fields"),
     "no column k": (edit_csv(without("k")), r"column 'k' is missing"),
     "no threshold": (edit_csv(without("J1.2")), r"column 'J1\.2' is missing"),
@@ -441,20 +454,15 @@ def test_design_report_says_when_it_was_regularised(tmp_path: Path, platoon: Des
 # --- live table ----------------------------------------------------------------------------------------------------------
 
 
-def live(console: Console, samples: int = 100) -> LiveTable:
-    """A table for two signals and two residuals."""
-    return LiveTable("platoon", samples, ["gap12_m", "speed1_mps"], ["r1.1", "r1.2"], ["measurement", "control"], console=console)
-
-
 def run_live(table: LiveTable, samples: int = 100) -> None:
     for k in range(samples):
         plant = "starting" if k < 5 else "none" if k < 60 else "confirmed"
-        table.update(k, [1.0, 2.0], [0.05, 0.1], [0.3, 1.2 if k >= 60 else 0.4], plant, {"measurement": "good", "control": "good"}, k + k // 3)
+        table.update(k, [1.0] * 6, [0.05] * 6, [0.3, 1.2 if k >= 60 else 0.4], plant, {"measurement": "good", "control": "good"}, k + k // 3)
 
 
-def test_live_without_a_terminal_prints_changes_only() -> None:
+def test_live_without_a_terminal_prints_changes_only(platoon: Design) -> None:
     out = io.StringIO()
-    with live(Console(file=out, force_terminal=False, width=120)) as table:
+    with LiveTable(platoon, 100, Console(file=out, force_terminal=False, width=120)) as table:
         run_live(table)
     lines = out.getvalue().splitlines()
     assert len(lines) == 3
@@ -462,10 +470,10 @@ def test_live_without_a_terminal_prints_changes_only() -> None:
     assert "plant confirmed" in lines[2] and "measurement good" in lines[2]
 
 
-def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state() -> None:
+def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state(platoon: Design) -> None:
     out = io.StringIO()
     began = time.monotonic()
-    with live(Console(file=out, force_terminal=True, width=100, height=40, color_system="standard"), 2000) as table:
+    with LiveTable(platoon, 2000, Console(file=out, force_terminal=True, width=100, height=40, color_system="standard")) as table:
         run_live(table, 2000)
         drawn = table.drawn
     assert drawn <= 2 + 5 * (time.monotonic() - began)
@@ -475,9 +483,9 @@ def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state() -> None:
     assert out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0  # the cursor is back
 
 
-def test_live_ends_cleanly_when_interrupted() -> None:
+def test_live_ends_cleanly_when_interrupted(platoon: Design) -> None:
     out = io.StringIO()
-    with pytest.raises(KeyboardInterrupt), live(Console(file=out, force_terminal=True, width=100, height=40)) as table:
+    with pytest.raises(KeyboardInterrupt), LiveTable(platoon, 10, Console(file=out, force_terminal=True, width=100, height=40)) as table:
         run_live(table, 10)
         raise KeyboardInterrupt
     assert out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0

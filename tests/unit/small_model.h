@@ -33,7 +33,8 @@ static const uint8_t sm_silence_b[] = {0U};
 static const hg_trigger_config sm_trigger_b = {.width = 1U, .levels = 1U, .interval_max = 1U, .silence = sm_silence_b, .delta = sm_delta,
                                                .sigma = sm_zero, .activity = sm_zero, .zero = sm_zero};
 
-static const hg_code_scale sm_scale[] = {{R(SM_RESOLUTION), R(0), R(64), -SM_LIMIT, SM_LIMIT}, {R(SM_RESOLUTION), R(0), R(64), -SM_LIMIT, SM_LIMIT}};
+static const hg_code_scale sm_scale[] = {{R(SM_RESOLUTION), R(0), R(64), -SM_LIMIT, SM_LIMIT}, {R(SM_RESOLUTION), R(0), R(64),
+    -SM_LIMIT, SM_LIMIT}};
 static const hg_real sm_half[] = {R(SM_HALF), R(SM_HALF)};
 static const hg_real sm_span[] = {R(SM_SPAN), R(SM_SPAN)};
 static const hg_real sm_middle[] = {R(0), R(0)};

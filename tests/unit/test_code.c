@@ -6,7 +6,8 @@
 
 static hg_code_scale scale_of(double resolution, double offset, int32_t minimum, int32_t maximum)
 {
-    return (hg_code_scale){.resolution = R(resolution), .offset = R(offset), .per_unit = R(1.0 / resolution), .minimum = minimum, .maximum = maximum};
+    return (hg_code_scale){.resolution = R(resolution), .offset = R(offset), .per_unit = R(1.0 / resolution), .minimum = minimum,
+        .maximum = maximum};
 }
 
 static void every_code_survives_the_round_trip(void **state)
@@ -82,7 +83,8 @@ static void what_is_not_finite_or_overflows_is_invalid(void **state)
 {
     (void)state;
     const hg_code_scale scale = scale_of(1.0, 0.0, -INT32_MAX, INT32_MAX);
-    const hg_real hopeless[] = {REAL_NAN, REAL_INF, -REAL_INF, HG_REAL_MAX, -HG_REAL_MAX, R(2147483648.0), R(-2147483648.0), R(1e12), R(-1e12)};
+    const hg_real hopeless[] = {REAL_NAN, REAL_INF, -REAL_INF, HG_REAL_MAX, -HG_REAL_MAX, R(2147483648.0), R(-2147483648.0), R(1e12),
+        R(-1e12)};
     for (size_t i = 0U; i < COUNT(hopeless); i++) {
         assert_int_equal(HG_CODE_INVALID, hg_code_encode(&scale, hopeless[i]));
     }

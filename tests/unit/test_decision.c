@@ -248,7 +248,8 @@ static void all_thirty_two_generators_have_a_bit(void **state)
     for (uint32_t g = 0U; g < HG_GENERATORS_MAX; g++) {
         all_faults[g] = (uint32_t)1U << g;
     }
-    const hg_decision_config c = {.generators = (uint8_t)HG_GENERATORS_MAX, .feeds = all_feeds, .faults = all_faults, .up = 1U, .down = 1U, .latch = false};
+    const hg_decision_config c = {.generators = (uint8_t)HG_GENERATORS_MAX, .feeds = all_feeds, .faults = all_faults, .up = 1U,
+        .down = 1U, .latch = false};
     hg_decision self;
     assert_status(HG_OK, hg_decision_start(&self, &c, alarm));
     for (uint32_t g = 0U; g < HG_GENERATORS_MAX; g++) {

@@ -9,7 +9,8 @@ static const uint8_t ids[HG_E2E_IDS] = {0U};
 
 static hg_code_scale scale_of(double resolution, int32_t minimum, int32_t maximum)
 {
-    return (hg_code_scale){.resolution = R(resolution), .offset = R(0), .per_unit = R(1.0 / resolution), .minimum = minimum, .maximum = maximum};
+    return (hg_code_scale){.resolution = R(resolution), .offset = R(0), .per_unit = R(1.0 / resolution), .minimum = minimum,
+        .maximum = maximum};
 }
 
 /* A classic frame of 8 bytes with one field. */
@@ -22,7 +23,8 @@ static hg_message message_of(const hg_field *field, const hg_code_scale *scale)
 static hg_code_scale whole_range(const hg_field *field)
 {
     const int64_t top = (int64_t)1 << (field->length - (((field->flags & HG_FIELD_SIGNED) != 0U) ? 1 : 0));
-    return ((field->flags & HG_FIELD_SIGNED) != 0U) ? scale_of(1.0, (int32_t)(1 - top), (int32_t)(top - 1)) : scale_of(1.0, 0, (int32_t)(top - 2));
+    return ((field->flags & HG_FIELD_SIGNED) != 0U) ? scale_of(1.0, (int32_t)(1 - top), (int32_t)(top - 1)) : scale_of(1.0, 0,
+        (int32_t)(top - 2));
 }
 
 static void golden_bytes_come_out_and_go_back_in(void **state)
@@ -279,7 +281,8 @@ static void messages_that_no_frame_can_carry_are_invalid(void **state)
         m = usual, m.width = 0U, m.length = (uint8_t)length;
         assert_int_equal((length >= 2U) && (length <= 8U), hg_frame_valid(&m));
         m.flags = HG_CAN_FD;
-        const bool fd = ((length >= 2U) && (length <= 8U)) || (length == 12U) || (length == 16U) || (length == 20U) || (length == 24U) || (length == 32U);
+        const bool fd = ((length >= 2U) && (length <= 8U)) || (length == 12U) || (length == 16U) || (length == 20U) ||
+            (length == 24U) || (length == 32U);
         assert_int_equal(fd, hg_frame_valid(&m));
     }
 }
@@ -307,7 +310,8 @@ static void a_scale_wider_than_its_field_is_invalid(void **state)
     (void)state;
     const struct { hg_field field; int32_t minimum; int32_t maximum; bool valid; } cases[] = {
         {{16U, 8U, 0U}, 0, 254, true}, {{16U, 8U, 0U}, 0, 255, false}, {{16U, 8U, 0U}, -1, 10, false},
-        {{16U, 8U, HG_FIELD_SIGNED}, -127, 127, true}, {{16U, 8U, HG_FIELD_SIGNED}, -128, 127, false}, {{16U, 8U, HG_FIELD_SIGNED}, 0, 128, false},
+        {{16U, 8U, HG_FIELD_SIGNED}, -127, 127, true}, {{16U, 8U, HG_FIELD_SIGNED}, -128, 127, false}, {{16U, 8U, HG_FIELD_SIGNED}, 0,
+            128, false},
         {{16U, 31U, 0U}, 0, INT32_MAX - 1, true}, {{16U, 31U, 0U}, 0, INT32_MAX, false},
         {{16U, 32U, HG_FIELD_SIGNED}, -INT32_MAX, INT32_MAX, true}, {{16U, 32U, HG_FIELD_FLOAT32}, -INT32_MAX, INT32_MAX, true}};
     for (size_t i = 0U; i < COUNT(cases); i++) {
@@ -324,11 +328,13 @@ static void many_signals_share_a_long_frame(void **state)
     hg_field fields[30];
     hg_code_scale scales[30];
     for (uint16_t i = 0U; i < 30U; i++) {
-        fields[i] = (hg_field){.start = (uint16_t)(16U + (8U * i) + (((i % 2U) == 1U) ? 7U : 0U)), .length = 8U, .flags = ((i % 2U) == 1U) ? HG_FIELD_MOTOROLA : 0U};
+        fields[i] = (hg_field){.start = (uint16_t)(16U + (8U * i) + (((i % 2U) == 1U) ? 7U : 0U)), .length = 8U,
+            .flags = ((i % 2U) == 1U) ? HG_FIELD_MOTOROLA : 0U};
         scales[i] = scale_of(1.0, 0, 254);
     }
     const hg_message message = {
-        .id = 0x12345U, .flags = HG_CAN_EXTENDED | HG_CAN_FD | HG_CAN_BRS, .length = 32U, .width = 30U, .field = fields, .scale = scales, .data_id = ids};
+        .id = 0x12345U, .flags = HG_CAN_EXTENDED | HG_CAN_FD | HG_CAN_BRS, .length = 32U, .width = 30U, .field = fields,
+            .scale = scales, .data_id = ids};
     assert_true(hg_frame_valid(&message));
     for (int i = 0; i < 1000; i++) {
         int32_t code[30];

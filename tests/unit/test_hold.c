@@ -194,6 +194,61 @@ static void the_smaller_of_promise_and_slew_counts(void **state)
     assert_true(hg_hold_doubt(&r.hold));
 }
 
+/* After one frame the sender may be on any level: the longest silence and the widest threshold count, whichever levels they belong to. */
+static void while_the_level_is_unknown_the_widest_counts(void **state)
+{
+    (void)state;
+    const uint8_t quiet[3] = {0U, 2U, 1U};
+    const int32_t sigma[3] = {2, 1, 4};
+    const uint16_t delta[3] = {0U, 0U, 0U};
+    const int32_t activity[3] = {0, 10, 20};
+    const hg_trigger_config t = {.width = 1U, .levels = 3U, .interval_max = INTERVAL, .silence = quiet, .delta = delta, .sigma = sigma,
+                                 .activity = activity, .zero = zero_table};
+    const hg_real steps[HORIZON] = {R(10), R(20), R(30), R(40), R(50), R(60), R(70), R(80)};
+    hg_hold_config c = usual;
+    c.trigger = &t;
+    c.slew = steps;
+    const int32_t codes_sent[3] = {0, 0, 15};
+    const uint8_t longest[3] = {2U, 0U, 2U};
+    const double widest[3] = {4.0, 2.0, 1.0};
+    hg_hold self;
+    int32_t codes[2];
+    hg_real value;
+    hg_real radius;
+    uint8_t rewind;
+    assert_status(HG_OK, hg_hold_start(&self, &c, codes));
+    for (size_t i = 0U; i < 3U; i++) { /* one frame, level unknown; then level 0; then level 1 */
+        assert_status(HG_OK, hg_hold_receive(&self, &codes_sent[i], true));
+        hg_hold_step(&self, &value, &radius, &rewind);
+        for (uint32_t j = 1U; j < 4U; j++) {
+            hg_hold_step(&self, &value, &radius, &rewind);
+            assert_real((j <= longest[i]) ? steps[j - 1U] : R((widest[i] * 0.25) + 0.125), radius);
+        }
+    }
+}
+
+/* A slew table that falls is no table of the design's, but it must not end a doubt that a radius before has raised. */
+static void doubt_stays_until_it_is_settled(void **state)
+{
+    (void)state;
+    const hg_real falling[HORIZON * WIDTH] = {R(9), R(9), R(9), R(9), R(9), R(9), R(0), R(0), R(9), R(9), R(9), R(9), R(9), R(9), R(9),
+        R(9)};
+    hg_hold_config c = usual;
+    c.slew = falling;
+    rig r;
+    begin(&r);
+    assert_status(HG_OK, hg_hold_start(&r.hold, &c, r.codes));
+    frame(&r, 0, 0, true);
+    step(&r);
+    step(&r);
+    assert_false(hg_hold_doubt(&r.hold));
+    step(&r);
+    assert_true(hg_hold_doubt(&r.hold));
+    step(&r);
+    assert_real(0.0, r.radius[0]);
+    assert_true(hg_hold_doubt(&r.hold));
+}
+
 static void a_second_frame_of_one_sample_is_refused(void **state)
 {
     (void)state;
@@ -532,6 +587,8 @@ int main(void)
         cmocka_unit_test(before_the_first_frame_nothing_is_known),
         cmocka_unit_test(the_radius_follows_the_table_of_the_header),
         cmocka_unit_test(the_smaller_of_promise_and_slew_counts),
+        cmocka_unit_test(while_the_level_is_unknown_the_widest_counts),
+        cmocka_unit_test(doubt_stays_until_it_is_settled),
         cmocka_unit_test(a_second_frame_of_one_sample_is_refused),
         cmocka_unit_test(silence_past_the_longest_interval_is_a_loss_and_then_stale),
         cmocka_unit_test(a_frame_at_the_longest_interval_is_in_time),

@@ -96,7 +96,8 @@ static void the_relative_part_counts_from_the_code_of_zero(void **state)
     const int32_t none[] = {0};
     const uint8_t quiet[] = {0U};
     const int32_t zero[] = {-2000000000};
-    const hg_trigger_config c = {.width = 1U, .levels = 1U, .interval_max = 2U, .silence = quiet, .delta = half, .sigma = none, .activity = none, .zero = zero};
+    const hg_trigger_config c = {.width = 1U, .levels = 1U, .interval_max = 2U, .silence = quiet, .delta = half, .sigma = none,
+        .activity = none, .zero = zero};
     assert_int_equal(0, hg_trigger_threshold(&c, 0U, 0U, -2000000000));
     assert_int_equal(5, hg_trigger_threshold(&c, 0U, 0U, -1999999990));
     assert_int_equal(2000000000, hg_trigger_threshold(&c, 0U, 0U, 2000000000)); /* the distance alone exceeds 31 bits */
@@ -109,7 +110,8 @@ static void the_threshold_saturates(void **state)
     const int32_t sigma[] = {INT32_MAX};
     const uint8_t quiet[] = {0U};
     const int32_t zero[] = {-INT32_MAX};
-    const hg_trigger_config c = {.width = 1U, .levels = 1U, .interval_max = 2U, .silence = quiet, .delta = most, .sigma = sigma, .activity = sigma, .zero = zero};
+    const hg_trigger_config c = {.width = 1U, .levels = 1U, .interval_max = 2U, .silence = quiet, .delta = most, .sigma = sigma,
+        .activity = sigma, .zero = zero};
     assert_int_equal(INT32_MAX, hg_trigger_threshold(&c, 0U, 0U, -INT32_MAX));
     assert_int_equal(INT32_MAX, hg_trigger_threshold(&c, 0U, 0U, INT32_MAX));
 }
@@ -178,7 +180,8 @@ static void becoming_or_ceasing_to_be_invalid_is_worth_a_frame(void **state)
     const uint16_t none = 0U;
     const uint8_t quiet = 0U;
     const hg_trigger_config c = {
-        .width = 1U, .levels = 1U, .interval_max = 200U, .silence = &quiet, .delta = &none, .sigma = &huge, .activity = &zero, .zero = &zero};
+        .width = 1U, .levels = 1U, .interval_max = 200U, .silence = &quiet, .delta = &none, .sigma = &huge, .activity = &zero,
+            .zero = &zero};
     hg_trigger self;
     int32_t codes;
     const int32_t invalid = HG_CODE_INVALID;
@@ -225,7 +228,8 @@ static void intervals_and_promises_hold_over_all_small_configurations(void **sta
             for (uint8_t h1 = 0U; h1 < interval_max; h1++) {
                 const uint8_t quiet[2] = {h0, h1};
                 const hg_trigger_config c = {
-                    .width = 1U, .levels = 2U, .interval_max = interval_max, .silence = quiet, .delta = delta, .sigma = sigma, .activity = activity, .zero = zero};
+                    .width = 1U, .levels = 2U, .interval_max = interval_max, .silence = quiet, .delta = delta, .sigma = sigma,
+                        .activity = activity, .zero = zero};
                 hg_trigger self;
                 int32_t sent;
                 int32_t shadow = 0;

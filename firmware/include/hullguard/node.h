@@ -6,9 +6,10 @@
  *      on every frame:      hg_node_receive(&node, &frame)
  *      then, and overdue:   while (hg_node_step(&node, &verdict) == HG_OK) { send what hg_node_report() hands out }
  *
- *  Stamps. Every frame carries k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated as lost,
- *  never booked to the wrong sample. A closing frame j <= 7 ahead makes j steps without it first; a late one is counted, and two running
- *  restart the detector at the sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing frames lost in a row are an outage that only hg_node_overdue() sees.
+ *  Stamps. Every frame carries k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated as
+ *  lost, never booked to the wrong sample. A closing frame j <= 7 ahead makes j steps without it first; a late one is counted, and two running
+ *  restart the detector at the sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing
+ *  frames lost in a row are an outage that only hg_node_overdue() sees.
  *  Not reentrant per instance. hg_inbox is the one structure that an interrupt may share with the main loop. */
 #ifndef HULLGUARD_NODE_H
 #define HULLGUARD_NODE_H

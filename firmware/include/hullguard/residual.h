@@ -66,8 +66,8 @@ typedef struct {
  *  @param[out] r0  [observer residuals] before the post-filter
  *  @param[out] r   [filter residuals] after it
  *  @retval HG_OK         both have moved on
- *  @retval HG_E_NUMERIC  a signal is not finite or so large that the observer overflows; nothing changed. A filter that overflows leaves the
- *                        pair out of step: reset both */
+ *  @retval HG_E_NUMERIC  a signal is not finite or so large that the observer overflows; nothing changed. A filter that overflows leaves
+ *                        the pair out of step: reset both */
 hg_status hg_residual_pair_step(hg_residual_pair *self, const hg_real *value, hg_real *r0, hg_real *r);
 
 #endif

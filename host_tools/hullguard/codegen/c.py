@@ -17,13 +17,14 @@ from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED
 from hullguard.errors import InputError
 
 WIDTH = 140  # columns
+FLOAT32_MAX = float(np.finfo(np.float32).max)
 CAN_FLAGS = ((EXTENDED, "HG_CAN_EXTENDED"), (FD, "HG_CAN_FD"), (BRS, "HG_CAN_BRS"))
 FIELD_FLAGS = ((MOTOROLA, "HG_FIELD_MOTOROLA"), (SIGNED, "HG_FIELD_SIGNED"), (FLOAT32, "HG_FIELD_FLOAT32"))
 
 
 def real(x: float) -> str:
     """An exact literal of the number type."""
-    if not np.isfinite(x) or float(np.float32(x)) != x:
+    if not abs(x) <= FLOAT32_MAX or float(np.float32(x)) != x:
         raise ValueError(f"{x!r} is not a float32 number")
     mantissa, exponent = x.hex().split("p")
     if "." in mantissa:
@@ -69,8 +70,8 @@ def comment(text: str) -> list[str]:
 
 def fill(items: Sequence[str]) -> list[str]:
     """Items of one row with commas; a row that does not fit on a line is spread evenly over several, what continues it set further in."""
-    longest = max(len(i) for i in items)
-    count = -(-len(items) * (longest + 2) // (WIDTH - 8))
+    fits = (WIDTH - 8) // (max(len(i) for i in items) + 2)
+    count = -(-len(items) // fits)
     share = -(-len(items) // count)
     return [("    " if at == 0 else "        ") + ", ".join(items[at : at + share]) + "," for at in range(0, len(items), share)]
 
@@ -182,13 +183,20 @@ def _storage(tables: Tables) -> list[str]:
     ]
 
 
+def _kind(g: GroupTable, closes: bool) -> str:
+    """When a group's frame is sent."""
+    if closes:
+        return "closes the sample"
+    return "event" if g.interval_max > 1 else "periodic"
+
+
 def _header(design: Design, names: Names) -> str:
     tables, model = design.tables, design.model
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
     guard = f"HULLGUARD_MODEL_{tables.name.upper()}_H"
     signals = [s for g in tables.groups for s in g.signals]
     spans = [f"{unit_of(s.name) or 'no unit'}, {s.offset + s.resolution * s.minimum:g} .. {s.offset + s.resolution * s.maximum:g}" for s in signals]
-    kinds = [f"0x{g.message.id:X}, " + ("closes the sample" if i == tables.closing else "event" if g.interval_max > 1 else "periodic") for i, g in enumerate(tables.groups)]
+    kinds = [f"0x{g.message.id:X}, {_kind(g, i == tables.closing)}" for i, g in enumerate(tables.groups)]
     faults = [f"{f.type} fault of {model.signals[f.signal].name}" for f in model.faults]
     sample_us = round(model.sample_time_s * 1e6)
     lines = [
@@ -262,19 +270,23 @@ def _group(g: GroupTable, n: str) -> list[str]:
     signals = ", ".join(s.name for s in g.signals)
     lines = [f"/* ---- Group {n}: {signals or 'no signals, a bare tick'} ---- */", ""]
     if g.signals:
-        lines += [*comment(f"{n}_scale [{width}]: codes on the wire, value = offset + resolution code, signal units"), f"static const hg_code_scale {n}_scale[] = {{"]
+        lines += comment(f"{n}_scale [{width}]: codes on the wire, value = offset + resolution code, signal units")
+        lines.append(f"static const hg_code_scale {n}_scale[] = {{")
         lines += [line for s in g.signals for line in _scale(s)] + ["};", ""]
-        lines += [*comment(f"{n}_field [{width}]: places in the frame, DBC start bits"), f"static const hg_field {n}_field[] = {{"]
+        lines += comment(f"{n}_field [{width}]: places in the frame, DBC start bits")
+        lines.append(f"static const hg_field {n}_field[] = {{")
         lines += [_field(s) for s in g.signals] + ["};", ""]
     shape = f"{g.levels}][{width}"
     lines += table("uint8_t", f"{n}_data_id", "HG_E2E_IDS", [octets(g.message.data_id)], "data identifiers of profile 22 by counter value")
     lines += table("uint8_t", f"{n}_silence", f"{g.levels}", [unsigned(g.silence)], "samples after a frame in which the sender does not speak, by level")
     lines += table("uint16_t", f"{n}_delta", shape, [unsigned(r) for r in g.delta], "relative threshold, 1/65536, by level and signal")
     lines += table("int32_t", f"{n}_sigma", shape, [signed(r) for r in g.sigma], "absolute threshold, codes, by level and signal")
-    lines += table("int32_t", f"{n}_activity", shape, [signed(r) for r in g.activity], "change between two frames that reaches the level, codes; row 0 is not read")
+    about = "change between two frames that reaches the level, codes; row 0 is not read"
+    lines += table("int32_t", f"{n}_activity", shape, [signed(r) for r in g.activity], about)
     lines += table("int32_t", f"{n}_zero", f"{width}", [signed(s.zero for s in g.signals)], "code of the physical value 0")
     lines += table("hg_real", f"{n}_half", f"{width}", [reals(s.half for s in g.signals)], "error of a value that has just arrived, signal units")
-    lines += table("hg_real", f"{n}_slew", f"{horizon}][{width}", [reals(r) for r in g.slew], "error of a value 1, 2, .. samples old without a promise, signal units")
+    about = "error of a value 1, 2, .. samples old without a promise, signal units"
+    lines += table("hg_real", f"{n}_slew", f"{horizon}][{width}", [reals(r) for r in g.slew], about)
     lines += table("hg_real", f"{n}_span", f"{width}", [reals(s.span for s in g.signals)], "width of the range, signal units")
     lines += table("hg_real", f"{n}_middle", f"{width}", [reals(s.middle for s in g.signals)], "middle of the range, signal units")
     return lines
@@ -332,8 +344,8 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
         lines += table("hg_real", f"{n}_{part}", f"{residuals}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
     lines += _taps(g, n)
     for part, about in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
-        rows = [reals(r) for r in getattr(g, part)]
-        lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, f"threshold's part from initial state, disturbance and rounding, by sample {about}")
+        rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {about}"
+        lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
     lines += table("hg_real", f"{n}_tail_input", f"{width}", [reals(g.tail_input)], "weight of a radius older than the taps")
     lines += table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")
     return lines

@@ -12,9 +12,9 @@ from hullguard.design import hull, store
 from hullguard.design.arith import digits
 from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.ids import fold
-from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, post_filter, structure
+from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
 from hullguard.design.reach import reach
-from hullguard.design.search import FaultPath, search, smallest_faults
+from hullguard.design.search import FaultPath, between_events, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, Tables, group_table, message_table, rows
 from hullguard.errors import InputError
@@ -101,6 +101,15 @@ def fault_paths(model: Model, spec: Observer, faults: tuple[int, ...]) -> list[F
     return paths
 
 
+def _spoken(model: Model, spec: Observer) -> tuple[Array, Array]:
+    """Radius of each signal of a generator when it has just been sent, and the places of those that are sent together with a faulty one."""
+    places = [model.outputs[k] for k in spec.outputs] + [model.inputs[k] for k in spec.inputs]
+    quantum = np.array([model.signals[i].resolution / 2 for i in places])
+    faulty = {model.faults[f].signal for f in spec.faults}
+    together = {s for g in model.groups if faulty & set(g.signals) for s in g.signals}
+    return quantum, np.array([n for n, i in enumerate(places) if i in together], dtype=int)
+
+
 def check_observable(model: Model) -> None:
     """Refuse a plant with a state that no output shows."""
     plant = model.plant
@@ -138,7 +147,10 @@ def find(model: Model, tick: Tick) -> Stored:
             tick(f"generator {i + 1} of {len(model.observers)}", next(steps), trials)  # type: ignore[call-overload]
 
         own = np.concatenate([sub.Sy, sub.Su])
-        best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, step)
+        if spec.search.objective == "between events":
+            best = between_events(sub, spec.order, paths, *_spoken(model, spec))
+        else:
+            best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, step)
         o, f = best.observer, best.filter
         observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
     gain = plant.feedback.gain if plant.feedback is not None else None
@@ -154,7 +166,8 @@ def refilter(model: Model, old: Stored) -> Stored:
     for spec, stored in zip(model.observers, old.observers, strict=True):
         sub = sub_plant(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), spec, radius)
         G, H, L, T = structure(sub, stored.v, stored.gamma)
-        f = post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
+        plain = spec.search.objective == "between events"
+        f = no_filter(spec.order) if plain else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
         observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
     return replace(found, observers=tuple(observers))
 
@@ -192,7 +205,7 @@ def finish(model: Model, stored: Stored) -> Design:
     tables = _tables(model, groups, generators)
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
-    checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear)]
+    checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.search.objective != "between events")]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
     return Design(model, stored, generators, tables, tuple(checks), bound)
@@ -222,7 +235,8 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     sub = sub_plant(model, spec, radius)
     G, H, L, T = structure(sub, found.v, found.gamma)
     o = ObserverMatrices(found.v, found.gamma, G, H, L, T, found.W, found.V, found.V @ sub.D)
-    solved = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, spec.aware)
+    filtered = spec.search.objective != "between events"
+    solved = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, spec.aware) if filtered else no_filter(spec.order)
     f = replace(solved, Lo=found.Lo, Mo=found.Mo)
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
@@ -234,7 +248,7 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]")
     paths = fault_paths(model, spec, spec.faults)
     blind = np.full(len(paths), np.inf)
-    if paths:
+    if paths and filtered:
         try:
             plain = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, False)
             blind = smallest_faults(sub, o, plain, paths, own)

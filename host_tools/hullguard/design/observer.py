@@ -149,6 +149,12 @@ def post_filter(plant: SubPlant, G: Array, L: Array, H: Array, T: Array, W: Arra
     return PostFilter(Lo, Mo, X, S, Eb, Fb, epsilon)
 
 
+def no_filter(order: int) -> PostFilter:
+    """The post-filter that does nothing, for one residual."""
+    empty = np.zeros((order, order))
+    return PostFilter(np.zeros((order, 1)), np.eye(1), empty, np.eye(1), np.zeros((order, 0)), np.zeros((1, 0)), 0.0)
+
+
 def fused(o: ObserverMatrices, f: PostFilter) -> tuple[Array, Array, Array, Array]:
     """State, input, output and direct matrices of observer and post-filter in one, signals ordered [y; u]; platoon, section 3."""
     state = o.G - mul(f.Lo, o.W)

@@ -61,7 +61,9 @@ def reach(model: Model, horizon: int) -> Reach:
     loop = _closed_loop(model)
     wanted = [i for i, s in enumerate(model.signals) if s.slew is None]
     state = np.full(model.plant.n, np.inf)
-    if loop is not None and np.abs(np.linalg.eigvals(loop[0])).max() < 1.0:
+    # Where every output's slew is declared the loop only drives the emulator: the operating set is the declared one.
+    asked = any(model.signals[i].role == "output" for i in wanted)
+    if asked and loop is not None and np.abs(np.linalg.eigvals(loop[0])).max() < 1.0:
         state, signal, computed = _sums(*loop, horizon)
         state += np.abs(model.plant.equilibrium)
         for i in wanted:

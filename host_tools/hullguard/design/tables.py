@@ -146,16 +146,21 @@ def rows(a: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(x) for x in r) for r in a)
 
 
+def _codes(s: Signal, resolution: float, offset: float) -> tuple[int, int, int]:
+    """Smallest and largest code, and the bits of a signed field that holds them beside its most negative pattern, which says 'invalid'."""
+    minimum, maximum = round((s.low - offset) / resolution), round((s.high - offset) / resolution)
+    return minimum, maximum, max(abs(maximum), abs(minimum), 1).bit_length() + 1
+
+
 def signal_table(s: Signal, start: int, exact: bool) -> SignalTable:
     """Codes and the wire of one signal. `exact`: the receiver's value is the truth (an input applied as sent)."""
     resolution = float(nearest32(np.array(s.resolution)))
     offset = 0.0
-    if s.low > 0 or s.high < 0:
-        offset = float(nearest32(np.array(round((s.low + s.high) / 2 / resolution) * resolution)))
-    minimum, maximum = round((s.low - offset) / resolution), round((s.high - offset) / resolution)
-    bits = max(maximum, -minimum - 1, 1).bit_length() + 1
-    if minimum < -(2 ** (bits - 1)) + 1:
-        bits += 1  # the most negative pattern stands for 'invalid'
+    minimum, maximum, bits = _codes(s, resolution, offset)
+    middle = float(nearest32(np.array(round((s.low + s.high) / 2 / resolution) * resolution)))
+    if (_codes(s, resolution, middle)[2] + 7) // 8 < (bits + 7) // 8:
+        offset = middle  # saves a byte
+        minimum, maximum, bits = _codes(s, resolution, offset)
     if bits > CODE_BITS_MAX:
         raise InputError(f"signal '{s.name}': {s.low:g} .. {s.high:g} in steps of {s.resolution:g} needs {bits} bits, at most {CODE_BITS_MAX} fit; make the resolution coarser")
     length = 32 if s.float32 else (bits + 7) // 8 * 8

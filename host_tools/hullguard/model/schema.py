@@ -79,6 +79,7 @@ class Group:
 class Search:
     """How the free parameters of a generator are looked for."""
 
+    objective: str  # "smallest fault" | "between events"
     trials: int
     seed: int
     poles: tuple[float, float]
@@ -477,8 +478,8 @@ def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tup
         poles = s.vector("poles", 2) if "poles" in s else np.array([0.0, 0.9])
         if not -1.0 < poles[0] <= poles[1] < 1.0:
             raise s.error("poles", "expected [smallest, largest] inside the unit circle: -1 .. 1")
-        s.text("objective", "smallest fault", ["smallest fault"])
-        search = Search(s.whole("trials", 1, 1_000_000, 1000), s.whole("seed", 0, 2**32 - 1, 1), (float(poles[0]), float(poles[1])))
+        objective = s.text("objective", "smallest fault", ["smallest fault", "between events"])
+        search = Search(objective, s.whole("trials", 1, 1_000_000, 1000), s.whole("seed", 0, 2**32 - 1, 1), (float(poles[0]), float(poles[1])))
         s.close()
         names = [f.name for f in faults]
         observers.append(

@@ -113,9 +113,9 @@ class OnCan:
 class Run:
     """The loop."""
 
-    def __init__(self, design: Design, native: Native, bus: Bus, pace: Pace, log: candump.Writer | None = None) -> None:
+    def __init__(self, design: Design, native: Native, bus: Bus, pace: Pace, log: candump.Writer | None = None, start: int = REST) -> None:
         self.design, self.native, self.bus, self.pace = design, native, bus, pace
-        self.sender, self.node, self.trace = Sender(native), Node(native, REST), Trace()
+        self.sender, self.node, self.trace = Sender(native), Node(native, start), Trace()
         self._log = log
         closing = native.tables.closing
         self._order = [g for g in range(len(native.tables.groups)) if g != closing] + [closing]

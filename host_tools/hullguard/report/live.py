@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
+from typing import Self
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
+
+from hullguard.design.design import Design
 
 PERIOD_S = 0.2
 ROWS_MAX = 12  # signals, and generators, that fit a screen
@@ -24,12 +27,15 @@ BUS_STYLE = {"good": "blue", "absent": "dim", "lossy": "yellow", "stale": "bold 
 class LiveTable:
     """Live view of a run. Use it as a context manager and call update() with every sample; it draws at most five times a second."""
 
-    def __init__(self, model: str, samples: int, signals: Sequence[str], residuals: Sequence[str], groups: Sequence[str], console: Console | None = None) -> None:
-        """Names of all signals, residuals and groups in the order in which update() gets their numbers; `samples` 0 is a run without an end."""
+    def __init__(self, design: Design, samples: int, console: Console | None = None) -> None:
+        """`samples` 0 is a run without an end."""
         self.console = console or Console()
         self.drawn = 0
-        self._model, self._samples = model, samples
-        self._signals, self._residuals, self._groups = list(signals), list(residuals), list(groups)
+        self._model, self._samples = design.model.name, samples
+        self._signals = [s.name for s in design.model.signals]
+        self._residuals = [f"r{g + 1}.{i + 1}" for g, t in enumerate(design.tables.generators) for i in range(len(t.output))]
+        self._groups = [g.name for g in design.tables.groups]
+        self._senders = max(1, len(self._groups) - 1)  # the frame that closes a sample is no measurement
         self._live: Live | None = None
         self._said: tuple[str, tuple[tuple[str, str], ...]] | None = None
         self._next = 0.0
@@ -37,7 +43,7 @@ class LiveTable:
         self._worst = [0.0] * len(self._residuals)
         self._view: tuple[int, list[float], list[float], list[float], str, dict[str, str], int] | None = None
 
-    def __enter__(self) -> LiveTable:
+    def __enter__(self) -> Self:
         """Start drawing."""
         self._began = time.monotonic()
         if self.console.is_terminal:
@@ -55,7 +61,7 @@ class LiveTable:
                 self._live = None
 
     def update(self, k: int, values: Sequence[float], radii: Sequence[float], ratios: Sequence[float], plant: str, bus: Mapping[str, str], frames: int) -> None:
-        """Sample k: what is known of each signal, |r|/J of each residual, the verdict, health of each group, frames that the groups have sent so far."""
+        """Sample k: what is known of each signal, |r|/J of each residual, the verdict, health of each group, measurement frames sent so far."""
         if not self.console.is_terminal:
             self._say(k, plant, bus)
             return
@@ -90,17 +96,23 @@ class LiveTable:
         narrow = self.console.width < 72
         head = Table.grid(padding=(0, 2))
         rate = (k + 1) / max(time.monotonic() - self._began, 1e-9)
-        bar = ProgressBar(total=self._samples or None, completed=k + 1, width=BAR, pulse=not self._samples)
-        head.add_row(Text(self._model, style="bold"), bar, Text(f"{k + 1}" + (f" of {self._samples}" if self._samples else "") + " samples"), Text(f"{rate:.0f} samples/s", style="dim"))
+        bar = ProgressBar(
+            total=self._samples or None, completed=k + 1, width=BAR, pulse=not self._samples, style="bright_black", complete_style="blue", finished_style="blue"
+        )
+        head.add_row(
+            Text(self._model, style="bold"),
+            bar,
+            Text(f"{k + 1}" + (f" of {self._samples}" if self._samples else "") + " samples"),
+            Text(f"{rate:.0f} samples/s", style="dim"),
+        )
         state = Table.grid(padding=(0, 1))
-        state.add_row("plant", Text(f" {PLANT_SAYS.get(plant, plant)} ", style=PLANT_STYLE.get(plant, "")))
+        state.add_row("plant", Text().append(f" {PLANT_SAYS.get(plant, plant)} ", style=PLANT_STYLE.get(plant, "")))
         health = Text()
         for g in self._groups:
             h = bus.get(g, "absent")
             health.append(f"{g} ").append(h, style=BUS_STYLE.get(h, "")).append("   ")
         state.add_row("bus", health)
-        periodic = max(1, (k + 1) * len(self._groups))
-        state.add_row("sent", Text(f"{frames} frames, {100 * frames / periodic:.1f} % of periodic"))
+        state.add_row("sent", Text(f"{frames} measurement frames, {100 * frames / ((k + 1) * self._senders):.1f} % of periodic"))
         tables = Table.grid(padding=(0, 3))
         if narrow:
             tables.add_row(self._signal_table(values, radii))

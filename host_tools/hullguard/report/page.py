@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -27,7 +28,7 @@ THEME = {
 }
 INK, MUTED, GRID, EDGE, BLUE, SKY, GREEN, RED, PINK, AMBER = (light for light, _ in THEME.values())
 
-RC: dict[str, Any] = {
+RC: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "hullguard",
     "path.simplify": False,
@@ -68,12 +69,12 @@ h1{font-size:1.5rem;line-height:1.25;margin:.2rem 0 .3rem}
 h2{font-size:1.15rem;margin:2.2rem 0 .4rem;padding-top:.7rem;border-top:1px solid var(--grid)}
 h3{font-size:1rem;margin:1.3rem 0 .3rem}
 p{margin:.4rem 0 .7rem;max-width:52rem}
-.lead{font-size:1.08rem}
+.lead{font-size:1.08rem;max-width:none}
 .note,figcaption,caption{color:var(--muted);font-size:.88rem}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(148px,1fr));gap:10px;margin:1rem 0}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(132px,1fr));gap:10px;margin:1rem 0}
 .tile{background:var(--soft);border-radius:8px;padding:10px 12px;border-left:4px solid var(--edge)}
 .tile.good{border-left-color:var(--good)}.tile.bad{border-left-color:var(--bad)}
-.tile b{display:block;font-size:1.35rem;line-height:1.25;font-variant-numeric:tabular-nums}
+.tile b{display:block;font-size:1.3rem;line-height:1.3;white-space:nowrap;font-variant-numeric:tabular-nums}
 .tile span{display:block;color:var(--muted);font-size:.82rem;line-height:1.35}
 .wide{overflow-x:auto;margin:.5rem 0 .8rem}
 table{border-collapse:collapse;font-size:.88rem;font-variant-numeric:tabular-nums}
@@ -95,7 +96,7 @@ svg text{font-family:"DejaVu Sans",Verdana,system-ui,sans-serif}
 code{font:.9em ui-monospace,"DejaVu Sans Mono",Consolas,monospace;overflow-wrap:anywhere}
 details{margin:.6rem 0}summary{cursor:pointer;color:var(--blue)}
 aside{background:var(--soft);border-left:4px solid var(--blue);border-radius:8px;padding:8px 14px;margin:1rem 0}
-aside p{margin:.2rem 0}
+aside p{margin:.2rem 0;max-width:none}
 @media (max-width:600px){main{padding:14px 12px 32px}body{font-size:14px}h1{font-size:1.25rem}.tiles{grid-template-columns:1fr 1fr}}
 @media print{@page{size:A4;margin:14mm}main{max-width:none;padding:0}body{font-size:10.5pt}svg{min-width:0}.tiles{grid-template-columns:repeat(4,1fr)}
 figure,.tile,tr,aside{break-inside:avoid}h2,h3{break-after:avoid}.wide,figure>div{overflow:visible}}
@@ -109,7 +110,7 @@ def esc(value: object) -> str:
 
 def num(value: float | None, digits: int = 3) -> str:
     """A number as people write it; a dash where there is none."""
-    if value is None or value != value:
+    if value is None or math.isnan(value):
         return "–"
     if value in (float("inf"), float("-inf")):
         return "∞" if value > 0 else "−∞"
@@ -120,7 +121,7 @@ def num(value: float | None, digits: int = 3) -> str:
 
 def percent(part: float | None, digits: int = 3) -> str:
     """A share in per cent."""
-    return "–" if part is None or part != part else f"{num(100 * part, digits)} %"
+    return "–" if part is None or math.isnan(part) else f"{num(100 * part, digits)}\u00a0%"
 
 
 def plural(count: int, what: str) -> str:

@@ -55,7 +55,7 @@ class Residual:
     generator: int  # 1 ..
     r: Array
     J: Array
-    ratio: Array  # |r| / J, 0 where the detector was still starting
+    ratio: Array  # |r| / J, 0 where there is no threshold
 
 
 @dataclass(frozen=True)
@@ -252,13 +252,13 @@ def _column(column: dict[str, Array], name: str, where: Path) -> Array:
     return column[name]
 
 
-def _residuals(column: dict[str, Array], ready: Array, where: Path) -> tuple[Residual, ...]:
+def _residuals(column: dict[str, Array], where: Path) -> tuple[Residual, ...]:
     out = []
-    for name in column:
+    for name, r in column.items():
         generator, dot, place = name[1:].partition(".")
         if name.startswith("r") and dot and generator.isdigit() and place.isdigit():
-            r, J = column[name], _column(column, f"J{generator}.{place}", where)
-            usable = ready & np.isfinite(r) & np.isfinite(J) & (J > 0)
+            J = _column(column, f"J{generator}.{place}", where)
+            usable = np.isfinite(r) & np.isfinite(J) & (J > 0)
             ratio = np.where(usable, np.abs(r) / np.where(usable, J, 1.0), 0.0)
             out.append(Residual(name, int(generator), r, J, ratio))
     if not out:
@@ -335,7 +335,7 @@ def read_run(directory: Path) -> Run:
         bus=_bus(verdicts, groups, k),
         bits=_column(column, "bits", where),
         signals=signals,
-        residuals=_residuals(column, plant > 0, where),
+        residuals=_residuals(column, where),
         groups=groups,
         faults=_faults(top, labels),
         verdicts=verdicts,

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation, Transform
+from numpy.typing import NDArray
 
 from hullguard.model.table import Array
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RED, SKY
@@ -29,7 +30,23 @@ PLANT_FILL = {"starting": ("#b7bec6", "#14181c"), "none": ("#8fc9ea", "#14181c")
 BUS_FILL = {"good": ("#8fc9ea", "#14181c"), "absent": ("#b7bec6", "#14181c"), "lossy": ("#f2a81d", "#14181c"), "stale": ("#5d429c", "#ffffff")}
 PLANT_SAYS = {"starting": "starting", "none": "no fault", "provisional": "provisional", "confirmed": "fault confirmed"}
 
-UNITS = {"mps2": "m/s²", "mps": "m/s", "m": "m", "s": "s", "rad": "rad", "radps": "rad/s", "deg": "°", "a": "A", "v": "V", "k": "K", "c": "°C", "bar": "bar", "pa": "Pa", "n": "N", "nm": "N m"}
+UNITS = {
+    "mps2": "m/s²",
+    "mps": "m/s",
+    "m": "m",
+    "s": "s",
+    "rad": "rad",
+    "radps": "rad/s",
+    "deg": "°",
+    "a": "A",
+    "v": "V",
+    "k": "K",
+    "c": "°C",
+    "bar": "bar",
+    "pa": "Pa",
+    "n": "N",
+    "nm": "N m",
+}
 
 
 @dataclass(frozen=True)
@@ -68,12 +85,12 @@ class Sheet:
             self._y -= height + self._gap
         return ax
 
-    def legend(self, handles: Sequence[Artist], left: float = LEFT, below: float = 0.0) -> None:
+    def legend(self, handles: Sequence[Artist], left: float = LEFT) -> None:
         """One line of legend above everything."""
         self.figure.legend(
             handles=list(handles),
             loc="upper left",
-            bbox_to_anchor=(left / self.width, 1 - (0.02 + below) / self.height),
+            bbox_to_anchor=(left / self.width, 1 - 0.05 / self.height),
             ncols=len(handles),
             borderaxespad=0.0,
             borderpad=0.1,
@@ -89,8 +106,8 @@ def unit_of(name: str) -> tuple[str, str]:
     return (stem, UNITS[last]) if stem and last in UNITS else (name, "")
 
 
-def _edges(n: int, bins: int) -> Array:
-    return np.linspace(0, n, min(bins, n) + 1).astype(int)[:-1]
+def _edges(n: int, bins: int) -> NDArray[np.intp]:
+    return np.linspace(0, n, min(bins, n) + 1).astype(np.intp)[:-1]
 
 
 def _is_long(n: int) -> bool:
@@ -109,7 +126,7 @@ def line(ax: Axes, t: Array, y: Array, color: str, step: bool = False, width: fl
         low, high = _ends(y)
         t = np.repeat(t[_edges(len(t), BINS)], 2)
         y = np.column_stack([low, high]).ravel()
-        ax.plot(t, y, color=color, lw=min(width, 0.9), zorder=order)
+        ax.plot(t, y, color=color, lw=min(width, 0.6), zorder=order)
     elif step:
         ax.step(t, y, where="post", color=color, lw=width, zorder=order)
     else:
@@ -151,7 +168,14 @@ def _above(ax: Axes) -> Transform:
     return ax.transAxes + ScaledTranslation(0.0, 0.04, ax.figure.dpi_scale_trans)
 
 
-def mark_faults(ax: Axes, run: Run, w: Window, labels: bool = False) -> None:
+def _top(run: Run, legend: float = 0.24, heading: bool = True) -> float:
+    """Inches above the first axes: legend, names of the faults, heading."""
+    crowded = any(0 < (b.start - a.start) * 1.0 < 0.04 * len(run.k) for a, b in zip(run.faults, run.faults[1:], strict=False))
+    names = 0.0 if not run.faults else 0.34 if crowded else 0.2
+    return legend + names + (0.24 if heading else 0.1)
+
+
+def mark_faults(ax: Axes, run: Run, w: Window, labels: bool = False, above: float = 15.0) -> None:
     """Fault intervals as shaded areas, detection dashed, confirmation solid."""
     low, high = ax.get_xlim()
     taken = [-1e9, -1e9]
@@ -168,8 +192,18 @@ def mark_faults(ax: Axes, run: Run, w: Window, labels: bool = False) -> None:
             row = next((i for i, x in enumerate(taken) if start - x > 0.035 * (high - low)), None)
             if row is not None:
                 taken[row] = start
-                ax.annotate(f.label, (start, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 15 + 10 * row), textcoords="offset points", ha="center", va="bottom", color=PINK, fontweight="bold", annotation_clip=False)
-                ax.annotate("", (start, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 15 + 10 * row), textcoords="offset points", arrowprops={"arrowstyle": "-", "color": PINK, "lw": 0.9, "shrinkA": 0, "shrinkB": 0}, annotation_clip=False)
+                ax.annotate(
+                    f.label,
+                    (start, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(0, above + 10 * row),
+                    textcoords="offset points",
+                    ha="center",
+                    va="bottom",
+                    color=PINK,
+                    fontweight="bold",
+                    annotation_clip=False,
+                )
 
 
 def fault_legend(run: Run) -> list[Artist]:
@@ -199,9 +233,12 @@ def chosen_residuals(run: Run, count: int = PANELS) -> tuple[list[Residual], int
     order = sorted(rank, key=lambda g: (*rank[g], g))
     for g in order:
         mine = [r for r in run.residuals if r.generator == g]
+        if len(mine) > count:
+            closest = sorted(mine, key=lambda r: -float(r.ratio.max(initial=0.0)))[:count]
+            mine = [r for r in mine if any(r is c for c in closest)]
         if len(shown) + len(mine) > count and shown:
             break
-        shown += mine[:count]
+        shown += mine
     left = {r.generator for r in run.residuals} - {r.generator for r in shown}
     return shown, len(run.residuals) - len(shown), len(left)
 
@@ -234,7 +271,11 @@ def draw_residual(ax: Axes, run: Run, w: Window, r: Residual) -> None:
     before = r.ratio if first is None else r.ratio[run.k < first]
     cut = bool(np.any(np.abs(r.r[rows]) > top))
     # The largest before the fault is what a reader checks; in a window without it, the largest of the window.
-    more = f"largest |r|/J: {before.max(initial=0.0):.2f} before the fault, {r.ratio.max(initial=0.0):.2f} overall" if first is not None else f"largest |r|/J {quiet.max(initial=0.0):.2f}"
+    more = (
+        f"largest |r|/J: {before.max(initial=0.0):.2f} before the fault, {r.ratio.max(initial=0.0):.2f} overall"
+        if first is not None
+        else f"largest |r|/J {quiet.max(initial=0.0):.2f}"
+    )
     _heading(ax, r.name, more + (", cut at the frame" if cut else ""))
 
 
@@ -246,7 +287,7 @@ def residual_legend(run: Run) -> list[Artist]:
 def residual_figure(run: Run, w: Window, residuals: Sequence[Residual]) -> Figure:
     """A panel a residual."""
     height = 1.45 if len(residuals) <= 3 else 1.05
-    sheet = Sheet([height] * len(residuals), 0.3, 0.85 if run.faults else 0.5)
+    sheet = Sheet([height] * len(residuals), 0.3, _top(run))
     axes = []
     for i, r in enumerate(residuals):
         ax = sheet.add(height)
@@ -262,12 +303,11 @@ def ratio_figure(run: Run, w: Window) -> Figure:
     """All residuals at once: |r|/J as colour."""
     n = len(run.residuals)
     height = max(0.6, min(0.17 * n, 4.0))
-    sheet = Sheet([height], 0.0, 0.8 if run.faults else 0.5)
+    sheet = Sheet([height], 0.0, _top(run, heading=False))
     ax = sheet.add(height, right=1.0)
     edges = _edges(w.size, BINS)
     data = np.array([np.maximum.reduceat(r.ratio[w.rows], edges) for r in run.residuals])
-    shades = LinearSegmentedColormap.from_list("ratio", ["#eef4f8", "#9ccbe6", "#3f8fc0", "#0d4f80"])
-    shades.set_over("#f08c00")
+    shades = LinearSegmentedColormap.from_list("ratio", ["#eef4f8", "#9ccbe6", "#3f8fc0", "#0d4f80"]).with_extremes(over="#f08c00")
     low, high = float(run.time[w.first]), float(run.time[w.last - 1]) + run.sample_time_s
     image = ax.imshow(data, aspect="auto", interpolation="nearest", cmap=shades, vmin=0.0, vmax=1.0, extent=(low, high, n - 0.5, -0.5))
     ax.grid(False)
@@ -275,7 +315,7 @@ def ratio_figure(run: Run, w: Window) -> Figure:
     ax.set_xlabel("time (s)")
     bar = ax.inset_axes((1.02, 0.0, 0.016, 1.0))
     drawn = sheet.figure.colorbar(image, cax=bar, extend="max", ticks=[0, 0.5, 1])
-    drawn.outline.set_visible(False)  # type: ignore[operator]
+    drawn.outline.set_visible(False)
     bar.set_ylabel("|r| / J")
     _limits(ax, run, w)
     # The areas would tint the colours: lines only.
@@ -302,7 +342,18 @@ def mark_faults_above(ax: Axes, run: Run) -> None:
         start = run.at(f.start)
         if low <= start <= high and start - taken > 0.035 * (high - low):
             taken = start
-            ax.annotate(f.label, (start, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points", ha="center", va="bottom", color=PINK, fontweight="bold", annotation_clip=False)
+            ax.annotate(
+                f.label,
+                (start, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 3),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                color=PINK,
+                fontweight="bold",
+                annotation_clip=False,
+            )
 
 
 # --- events --------------------------------------------------------------------------------------------------------------
@@ -323,7 +374,7 @@ def draw_raster(ax: Axes, run: Run, w: Window) -> None:
         if _is_long(w.size):
             edges = _edges(w.size, BINS // 4)
             share = np.add.reduceat(event.astype(float), edges) / np.diff(np.append(edges, w.size))
-            ax.fill_between(t[edges], y, y + 0.8 * share, step="post", color=GREEN, alpha=0.85, lw=0, zorder=2)
+            ax.fill_between(np.append(t[edges], t[-1]), y, y + 0.8 * np.append(share, share[-1]), step="post", color=GREEN, alpha=0.85, lw=0, zorder=2)
             ax.axhline(y, color=EDGE, lw=0.6, zorder=1)
         else:
             at = t[event]
@@ -346,11 +397,11 @@ def event_figure(run: Run, w: Window) -> Figure:
     event = [g for g in run.groups if not is_every_sample(g, len(run.k))]
     raster = 0.12 + 0.3 * len(run.groups)
     height = 0.95 if len(event) <= 3 else 0.72
-    sheet = Sheet([raster] + [height] * len(event), 0.34, 0.62 if run.faults else 0.38)
+    sheet = Sheet([raster] + [height] * len(event), 0.34, _top(run, heading=False))
     left, hist = _name_margin([g.name for g in run.groups]), 1.9
     ax = sheet.add(raster, left=left, right=hist)
     draw_raster(ax, run, w)
-    mark_faults(ax, run, w, labels=True)
+    mark_faults(ax, run, w, labels=True, above=3.0)
     axes, bars = [ax], []
     share = "share of samples with a frame (full height: every sample)" if _is_long(w.size) else "frames of each group, a stroke each"
     sheet.figure.text(left / sheet.width, 1 - 0.05 / sheet.height, share, ha="left", va="top", color=MUTED)
@@ -387,10 +438,12 @@ def _draw_intervals(ax: Axes, run: Run, w: Window, g: GroupRun) -> None:
         ax.plot(x, y, color=GREEN, lw=0.8, zorder=2)
         if len(at) <= 400:
             ax.plot(t, steps, "o", color=GREEN, ms=2.4, mew=0, zorder=2.4)
-    top = max(float(g.interval_max or 1), float(steps.max(initial=1.0)))
-    ax.set_ylim(0, 1.15 * top)
+    longest = max(float(g.interval_max or 1), float(steps.max(initial=1.0)))
+    usual = float(np.quantile(steps, 0.98)) if len(steps) else longest
+    cut = longest > 3 * usual  # a lost sender must not flatten the rest
+    ax.set_ylim(0, 1.15 * (1.4 * usual if cut else longest))
     ax.yaxis.set_major_locator(MaxNLocator(4, integer=True, min_n_ticks=2))
-    mean_text = "" if g.interval_mean is None else f"mean {g.interval_mean:.2f}, longest {g.interval_max:g}"
+    mean_text = "" if g.interval_mean is None else f"mean {g.interval_mean:.2f}, longest {g.interval_max:g}" + (", cut at the frame" if cut else "")
     _heading(ax, f"{g.name}: samples between frames", mean_text)
 
 
@@ -399,14 +452,16 @@ def _draw_histogram(bar: Axes, g: GroupRun, beside: Axes) -> None:
     counts = [g.histogram[i] for i in intervals]
     bar.barh(intervals, counts, height=0.72, color=GREEN, alpha=0.85, zorder=2)
     bar.set_ylim(beside.get_ylim())
+    top = bar.get_ylim()[1]
     bar.yaxis.set_major_locator(MaxNLocator(4, integer=True, min_n_ticks=2))
     bar.tick_params(labelleft=False)
     most = max(counts, default=1)
     bar.set_xlim(0, 1.3 * most)
     bar.xaxis.set_major_locator(MaxNLocator(3, integer=True))
-    if len(intervals) <= 6:
+    if top <= 12:
         for i, c in zip(intervals, counts, strict=True):
-            bar.text(c + 0.03 * most, i, f"{c}", va="center", ha="left", fontsize=7, color=MUTED)
+            if i < top:
+                bar.text(c + 0.03 * most, i, f"{c}", va="center", ha="left", fontsize=7, color=MUTED)
     bar.set_xlabel("count")
 
 
@@ -415,19 +470,19 @@ def _draw_histogram(bar: Axes, g: GroupRun, beside: Axes) -> None:
 
 def load_window(run: Run) -> int:
     """Samples over which the load is averaged: a second, at least ten samples, at most a tenth of the run."""
-    return max(1, min(max(10, round(1.0 / run.sample_time_s)), max(len(run.k) // 10, 5)))
+    return max(1, min(max(10, round(1.0 / run.sample_time_s)), max(len(run.k) // 10, 5), len(run.k)))
 
 
 def load_figure(run: Run, w: Window) -> Figure:
     """Bus load over a sliding window, against sending everything every sample."""
-    sheet = Sheet([1.7], 0.0, 0.62 if run.faults else 0.4)
+    sheet = Sheet([1.7], 0.0, _top(run, heading=False))
     ax = sheet.add(1.7)
     frames = run.info["frames"]
     n = load_window(run)
     total = np.concatenate([np.zeros(1), np.cumsum(run.bits)])
-    first = np.maximum(np.arange(len(run.bits)) + 1 - n, 0)
-    count = np.arange(len(run.bits)) + 1 - first
-    load = 100 * (total[1:] - total[first]) / (count * run.sample_time_s * run.bitrate)
+    # Whole windows only: a shorter one at the start would show loads that no bus sees.
+    load = np.full(len(run.bits), np.nan)
+    load[n - 1 :] = 100 * (total[n:] - total[:-n]) / (n * run.sample_time_s * run.bitrate)
     _limits(ax, run, w)
     t = run.time[w.rows]
     periodic = 100 * float(frames["bits_periodic"]) / (len(run.k) * run.sample_time_s * run.bitrate)
@@ -435,17 +490,17 @@ def load_figure(run: Run, w: Window) -> Figure:
     band(ax, t, np.zeros(w.size), load[w.rows], BLUE, 0.18)
     line(ax, t, load[w.rows], BLUE, width=1.3)
     ax.axhline(periodic, color=AMBER, lw=1.3, ls=(0, (5, 2)), zorder=2)
-    ax.axhline(bound, color=INK, lw=1.0, ls=(0, (1, 1.5)), zorder=2)
-    ax.set_ylim(0, 1.12 * max(periodic, bound, float(load.max(initial=0.0)), 1e-9))
+    ax.axhline(bound, color=INK, lw=1.2, ls=(0, (1.5, 1.5)), zorder=2)
+    ax.set_ylim(0, 1.12 * max(periodic, bound, float(np.nanmax(load, initial=0.0)), 1e-9))
     _number_ticks(ax, 5)
     ax.set_ylabel("bus load (%)")
     ax.set_xlabel("time (s)")
-    mark_faults(ax, run, w, labels=True)
+    mark_faults(ax, run, w, labels=True, above=3.0)
     sheet.legend(
         [
             Line2D([], [], color=BLUE, lw=1.4, label=f"event-triggered, mean {mean:.3g} %"),
             Line2D([], [], color=AMBER, lw=1.4, ls=(0, (5, 2)), label=f"periodic {periodic:.3g} %"),
-            Line2D([], [], color=INK, lw=1.0, ls=(0, (1, 1.5)), label=f"worst case of the design {bound:.3g} %"),
+            Line2D([], [], color=INK, lw=1.2, ls=(0, (1.5, 1.5)), label=f"worst case of the design {bound:.3g} %"),
         ]
     )
     return sheet.figure
@@ -474,7 +529,7 @@ def _bars(ax: Axes, run: Run, w: Window, row: float, state: Array, names: Sequen
         text = says.get(name, name)
         for left, length in spans:
             if length > (0.012 * len(text) + 0.01) * span:
-                ax.text(left + length / 2, row, text, ha="center", va="center", color=ink, fontsize=7.5, zorder=4)
+                ax.text(left + 0.006 * span, row, text, ha="left", va="center", color=ink, fontsize=7.5, zorder=4)
 
 
 def draw_verdict(ax: Axes, run: Run, w: Window) -> None:
@@ -506,7 +561,7 @@ def verdict_figure(run: Run, w: Window) -> Figure:
     """Verdict timeline."""
     rows = 1 + len(run.groups)
     height = 0.12 + 0.27 * rows
-    sheet = Sheet([height], 0.0, 0.85 if run.faults else 0.4)
+    sheet = Sheet([height], 0.0, _top(run, heading=False))
     ax = sheet.add(height, left=_name_margin([f"bus: {g.name}" for g in run.groups]))
     draw_verdict(ax, run, w)
     ax.set_xlabel("time (s)")
@@ -535,7 +590,9 @@ def draw_signal(ax: Axes, run: Run, w: Window, s: SignalRun) -> None:
     _limits(ax, run, w)
     low, high = value - radius, value + radius
     both = np.concatenate([reading[np.isfinite(reading)], value[np.isfinite(value)]])
-    usual = float(np.quantile(radius[np.isfinite(radius)], 0.95)) if np.any(np.isfinite(radius)) else 0.0
+    known = radius[np.isfinite(radius)]
+    # Some stale samples, whose radius is the whole range, must not flatten the rest.
+    usual = min(float(np.quantile(known, 0.95)), max(4 * float(np.median(known)), 0.5 * float(np.ptp(both)))) if len(known) and len(both) else 0.0
     bottom, top = (float(both.min()) - usual, float(both.max()) + usual) if len(both) else (-1.0, 1.0)
     pad = 0.06 * max(top - bottom, 1e-9)
     bottom, top = bottom - pad, top + pad
@@ -555,7 +612,7 @@ def signal_figure(run: Run, w: Window) -> Figure:
     columns = 1 if len(run.signals) <= 4 else 2
     rows = -(-len(run.signals) // columns)
     height = 1.25 if columns == 1 else 1.0
-    sheet = Sheet([height] * rows, 0.34, 0.85 if run.faults else 0.5)
+    sheet = Sheet([height] * rows, 0.34, _top(run))
     half = (sheet.width - LEFT - RIGHT - 0.62) / 2
     lowest: list[Axes] = []
     for i, s in enumerate(run.signals):
@@ -572,7 +629,14 @@ def signal_figure(run: Run, w: Window) -> Figure:
             ax.set_xlabel("time (s)")
         lowest.append(ax)
     band_mark = Patch(facecolor=SKY, alpha=0.5, label="value ± radius")
-    sheet.legend([Line2D([], [], color=INK, lw=0.9, label="reading of the sensor"), Line2D([], [], color=BLUE, lw=1.4, label="value at the detector"), band_mark, *fault_legend(run)])
+    sheet.legend(
+        [
+            Line2D([], [], color=INK, lw=0.9, label="reading of the sensor"),
+            Line2D([], [], color=BLUE, lw=1.4, label="value at the detector"),
+            band_mark,
+            *fault_legend(run),
+        ]
+    )
     return sheet.figure
 
 
@@ -584,7 +648,7 @@ def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
     residuals, _, _ = chosen_residuals(run, count)
     raster = 0.12 + 0.26 * len(run.groups)
     bars = 0.12 + 0.25 * (1 + len(run.groups))
-    sheet = Sheet([1.35] * len(residuals) + [raster, bars], 0.34, 0.85 if run.faults else 0.5, 0.5, 10.0)
+    sheet = Sheet([1.35] * len(residuals) + [raster, bars], 0.34, _top(run, 0.3), 0.5, 10.0)
     left = _name_margin([f"bus: {g.name}" for g in run.groups])
     axes = []
     for i, r in enumerate(residuals):
@@ -600,6 +664,18 @@ def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
     ax = sheet.add(bars, left=left)
     draw_verdict(ax, run, w)
     _heading(ax, "verdict")
+    keys = verdict_legend(run)
+    ax.legend(
+        handles=keys,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=len(keys),
+        borderaxespad=0.1,
+        borderpad=0.1,
+        columnspacing=1.2,
+        handlelength=1.2,
+        handletextpad=0.4,
+    )
     axes.append(ax)
     _times(axes)
     sheet.legend(residual_legend(run), left=left)
@@ -626,5 +702,4 @@ def close_up(run: Run) -> tuple[Window, FaultRun] | None:
 def near(run: Run, w: Window, residuals: Sequence[Residual], count: int) -> list[Residual]:
     """Of these residuals the ones with the largest |r|/J within a window, in their own order."""
     best = sorted(residuals, key=lambda r: -float(r.ratio[w.rows].max(initial=0.0)))[:count]
-    return [r for r in residuals if r in best]
-
+    return [r for r in residuals if any(r is b for b in best)]

@@ -14,6 +14,19 @@ from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, pl
 from hullguard.report.run_data import FaultRun, Run, read_run
 
 VERDICTS_MAX = 200  # rows of the table of changes
+COUNTERS = {
+    "good": "frames that passed their check and were used",
+    "lost": "frames missed, by their sequence counter",
+    "crc": "damaged frames",
+    "format": "wrong length or kind",
+    "repeated": "duplicates, ignored",
+    "early": "stamped ahead of the open sample, treated as lost",
+    "late": "stamped behind the open sample, treated as lost",
+    "numeric": "frames with a value out of range, refused",
+    "invalid": "frames with a value that its sender marked invalid",
+    "unknown": "identifiers that are not the model's",
+    "overdue": "samples closed without their closing frame",
+}
 GUARANTEE = (
     "Guaranteed: as long as the plant keeps to the model, its disturbances, noise, initial state, signal ranges and slews stay within the bounds the model states, and no corrupted frame passes its "
     "end-to-end check, no residual can exceed its threshold, whatever is sent late, lost or not at all; so a confirmed fault means that the plant or one of these bounds is broken."
@@ -58,28 +71,61 @@ def _body(run: Run) -> Iterator[str]:
     shown, hidden, generators = draw.chosen_residuals(run)
 
     yield "<h2>Residuals and thresholds</h2>"
-    left = "" if not hidden else f" {plural(hidden, 'residual')} not drawn here" + (f" ({plural(generators, 'whole generator')})" if generators else "") + ": none of them came closer to its threshold or alarmed earlier."
+    left = ""
+    if hidden:
+        whose = f" ({plural(generators, 'generator')} as a whole)" if generators else ""
+        left = f" {plural(hidden, 'residual')} not drawn here{whose}: those drawn alarmed first or came closest to their thresholds."
     yield f"<p>A fault is declared when a residual leaves its threshold. The threshold moves: it is the largest value a healthy plant can show, given what the detector knows.{esc(left)}</p>"
     zoom = draw.close_up(run)
     if zoom:
         w, fault = zoom
-        yield picture(draw.residual_figure(run, w, draw.near(run, w, shown, 4)), "zoom", f"Residuals around fault {fault.label}", f"Around fault {fault.label} ({fault.spec}): residuals, dimensionless, that came closest to their thresholds.")
+        yield picture(
+            draw.residual_figure(run, w, draw.near(run, w, shown, 4)),
+            "zoom",
+            f"Residuals around fault {fault.label}",
+            f"Around fault {fault.label} ({fault.spec}): residuals, dimensionless, that came closest to their thresholds.",
+        )
     long = " Every column of the picture shows the least and the largest of its samples." if len(run.k) > 2 * draw.BINS else ""
-    yield picture(draw.residual_figure(run, whole, shown), "residuals", "Residuals within their thresholds", f"Residuals rG.I (generator G, dimensionless) within ±J over the whole run.{long}")
+    yield picture(
+        draw.residual_figure(run, whole, shown),
+        "residuals",
+        "Residuals within their thresholds",
+        f"Residuals rG.I (generator G, dimensionless) within ±J over the whole run.{long}",
+    )
     if len(run.residuals) > 3:
-        yield picture(draw.ratio_figure(run, whole), "ratios", "All residuals relative to their thresholds", f"All {len(run.residuals)} residuals of {many} generators: |r|/J, the largest of each column. Samples at which the detector was still starting count as 0.")
+        yield picture(
+            draw.ratio_figure(run, whole),
+            "ratios",
+            "All residuals relative to their thresholds",
+            f"All {len(run.residuals)} residuals of {many} generators: |r|/J, the largest of each column.",
+        )
 
     yield "<h2>Verdict</h2>"
-    yield picture(draw.verdict_figure(run, whole), "verdict", "Verdict timeline", "What the detector said of the plant, and of the frames of each group, over the whole run. Where changes are too close to draw, the worst one shows.")
+    yield picture(
+        draw.verdict_figure(run, whole),
+        "verdict",
+        "Verdict timeline",
+        "What the detector said of the plant, and of the frames of each group, over the whole run. Where changes are too close to draw, the worst one shows.",
+    )
     yield from _verdict_table(run)
 
     yield "<h2>Events on the bus</h2>"
-    yield picture(draw.event_figure(run, whole), "events", "Frames of each group", "When each group sent, how long it was silent before, and how often each interval occurred.")
+    yield picture(
+        draw.event_figure(run, whole),
+        "events",
+        "Frames of each group",
+        "When each group sent, how long it was silent before, and how often each interval occurred.",
+    )
     yield _group_table(run)
 
     yield "<h2>Bus load</h2>"
     seconds = draw.load_window(run) * run.sample_time_s
-    yield picture(draw.load_figure(run, whole), "load", "Bus load", f"All frames on the bus, averaged over the last {num(seconds)} s, at {num(run.bitrate / 1000)} kbit/s. Periodic: every group with every sample, same frames.")
+    yield picture(
+        draw.load_figure(run, whole),
+        "load",
+        "Bus load",
+        f"All frames on the bus, averaged over the last {num(seconds)} s, at {num(run.bitrate / 1000)} kbit/s. Periodic: every group with every sample, same frames.",
+    )
     yield _load_table(run)
 
     yield "<h2>Signals</h2>"
@@ -126,7 +172,9 @@ def headline(run: Run) -> str:
     if not any(false):
         second = "no false alarm"
     else:
-        second = f"{plural(false[1], 'confirmed')} and {plural(false[0], 'provisional').removesuffix('s')} false alarm{'' if sum(false) == 1 else 's'}".replace("confirmeds", "confirmed")
+        second = f"{plural(false[1], 'confirmed')} and {plural(false[0], 'provisional').removesuffix('s')} false alarm{'' if sum(false) == 1 else 's'}".replace(
+            "confirmeds", "confirmed"
+        )
     return f"{first}; {second}."
 
 
@@ -134,19 +182,23 @@ def _summary(run: Run) -> Iterator[str]:
     info = run.info
     seconds = num(len(run.k) * run.sample_time_s, 5)
     yield f"<h1>hullguard run: {esc(info['model'])}, scenario {esc(info['scenario'])}</h1>"
-    yield f"<p class=\"note\">{len(run.k)} samples, {esc(seconds)} s at {esc(num(run.sample_time_s * 1000))} ms; bus {esc(info['bus'])}; {esc(info['real'])} arithmetic; seed {esc(info['seed'])}; model hash <code>{esc(info['model_hash'])}</code></p>"
+    yield f'<p class="note">{len(run.k)} samples, {esc(seconds)} s at {esc(num(run.sample_time_s * 1000))} ms; bus {esc(info["bus"])}; {esc(info["real"])} arithmetic; seed {esc(info["seed"])}; model hash <code>{esc(info["model_hash"])}</code></p>'
     yield f'<p class="lead">{esc(headline(run))}</p>'
     yield '<div class="tiles">' + "".join(_tiles(run)) + "</div>"
     if run.faults:
         yield _fault_table(run)
-    yield f"<aside><p>{esc(GUARANTEE)}</p><p class=\"note\">{esc(LIMITS)}</p></aside>"
+    yield f'<aside><p>{esc(GUARANTEE)}</p><p class="note">{esc(LIMITS)}</p></aside>'
 
 
 def _tiles(run: Run) -> Iterator[str]:
     info, frames = run.info, run.info["frames"]
     if run.faults:
         f = min(run.faults, key=lambda f: f.start)
-        yield tile("fault began" if len(run.faults) == 1 else f"first of {len(run.faults)} faults began", f"k = {f.start}", f"{num(f.start * run.sample_time_s, 5)} s: {f.name}, {f.kind}")
+        yield tile(
+            "fault began" if len(run.faults) == 1 else f"first of {len(run.faults)} faults began",
+            f"k = {f.start}",
+            f"{num(f.start * run.sample_time_s, 5)} s: {f.name}, {f.kind}",
+        )
         found = [f for f in run.faults if f.detected is not None]
         if len(run.faults) == 1:
             if found and f.detected is not None:
@@ -156,11 +208,14 @@ def _tiles(run: Run) -> Iterator[str]:
                 yield tile("fault found", "no", "not within this run", "bad")
         else:
             missed = len(run.faults) - len(found)
-            yield tile("faults found", f"{len(found)} of {len(run.faults)}", "all of them" if not missed else f"{missed} not found", "bad" if missed else "good")
+            yield tile(
+                "faults found", f"{len(found)} of {len(run.faults)}", "all of them" if not missed else f"{missed} not found", "bad" if missed else "good"
+            )
         delays = [d for d in (delay_of(f) for f in found) if d is not None]
         if delays:
             mean = sum(delays) / len(delays)
-            yield tile("delay" if len(delays) == 1 else "mean delay", plural(round(mean), "sample") if float(mean).is_integer() else f"{num(mean)} samples", f"{num(mean * run.sample_time_s)} s" + ("" if len(delays) == 1 else f", longest {num(max(delays))} samples"))
+            longest = "" if len(delays) == 1 else f", longest {num(max(delays))} samples"
+            yield tile("delay (samples)" if len(delays) == 1 else "mean delay (samples)", num(mean), f"{num(mean * run.sample_time_s)} s{longest}")
     alarms = info["false_alarms"]
     confirmed, provisional = round(alarms["confirmed"]), round(alarms["provisional"])
     yield tile("false alarms", str(confirmed + provisional), f"{confirmed} confirmed, {provisional} provisional", "bad" if confirmed + provisional else "good")
@@ -168,9 +223,15 @@ def _tiles(run: Run) -> Iterator[str]:
     if event:
         sent, all_of_them = sum(g.frames for g in event), len(event) * len(run.k)
         yield tile("event frames sent", percent(sent / all_of_them), f"{sent} of {all_of_them} periodic")
-    yield tile("bits on the bus", percent(frames["bits"] / frames["bits_periodic"] if frames["bits_periodic"] else None), f"of periodic; mean load {percent(frames['load_mean'])}")
+    yield tile(
+        "bits on the bus",
+        percent(frames["bits"] / frames["bits_periodic"] if frames["bits_periodic"] else None),
+        f"of periodic; mean load {percent(frames['load_mean'])}",
+    )
     margin = info["margin_max"]
-    yield tile("largest |r|/J" + (" before the fault" if run.faults else ""), num(margin), "alarm above 1", "" if margin is None else "good" if margin <= 1 else "bad")
+    yield tile(
+        "largest |r|/J" + (" before the fault" if run.faults else ""), num(margin), "alarm above 1", "" if margin is None else "good" if margin <= 1 else "bad"
+    )
 
 
 def _fault_table(run: Run) -> str:
@@ -179,7 +240,9 @@ def _fault_table(run: Run) -> str:
         found: object = Cell("not found", "bad") if f.detected is None else f.detected
         delay = delay_of(f)
         until = "end" if f.end is None else f.end
-        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, ", ".join(f.candidates) or "–"])
+        rows.append(
+            [f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, ", ".join(f.candidates) or "–"]
+        )
     return table(["", "fault", "#start", "#until", "#detected", "#confirmed", "#delay (samples)", "#delay (s)", "candidates named"], rows)
 
 
@@ -201,29 +264,39 @@ def _load_table(run: Run) -> str:
         ["frames, periodic sending", f["periodic"], "all groups, every sample, same codec"],
         ["frames on the bus", f["total"], "verdict and status frames included"],
         ["bits on the bus", f["bits"], "stuff bits and interframe space included"],
-        ["bits, periodic sending", f["bits_periodic"], ""],
+        ["bits, periodic sending", f["bits_periodic"], "all groups, every sample; without verdict and status frames"],
         ["load, mean", percent(f["load_mean"]), ""],
-        ["load, 99 % of samples below", percent(f["load_p99"]), ""],
+        ["load, 99 % of seconds below", percent(f["load_p99"]), ""],
         ["load, worst case of the design", percent(f["load_bound"]), "every sender at its shortest interval, longest stuffing"],
     ]
+    if f.get("lockstep_replies"):
+        rows.append(["answers in lockstep", f["lockstep_replies"], "frames that only pace the run; not counted above"])
     return table(["", "#value", ""], rows)
 
 
 def _communication(run: Run) -> str:
     counters = run.info["communication"]
-    rows = [[str(name).replace("_", " "), value] for name, value in counters.items() if isinstance(value, (int, float))]
+    rows = [[name.replace("_", " "), value, COUNTERS.get(name, "")] for name, value in counters.items() if isinstance(value, (int, float))]
     if not rows:
         return "<p>No counters.</p>"
-    busy = [r for r in rows if r[1]]
-    lead = "Nothing was lost, late or refused: all counters are 0." if not busy else "Counters of the detector's receive side; each only grows."
-    return f"<p>{esc(lead)}</p>" + table(["counter", "#count"], rows)
+    quiet = not any(value for name, value in counters.items() if name != "good" and isinstance(value, (int, float)))
+    lead = (
+        "Nothing was lost, damaged, late or refused."
+        if quiet
+        else "What the detector's receive side met. What is lost, late or refused widens radii; it never raises an alarm."
+    )
+    return f"<p>{esc(lead)}</p>" + table(["counter", "#count", "meaning"], rows)
 
 
 def _verdict_table(run: Run) -> Iterator[str]:
     rows = [[k, num(k * run.sample_time_s, 6), plant, ", ".join(f"{g} {h}" for g, h in bus.items())] for k, plant, bus in run.verdicts[:VERDICTS_MAX]]
     more = "" if len(run.verdicts) <= VERDICTS_MAX else f"The first {VERDICTS_MAX} of {len(run.verdicts)}; all are in run.json."
     if rows:
-        yield f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>" + table(["#sample", "#time (s)", "plant", "bus"], rows, more) + "</details>"
+        yield (
+            f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>"
+            + table(["#sample", "#time (s)", "plant", "bus"], rows, more)
+            + "</details>"
+        )
 
 
 def _facts(run: Run) -> str:
