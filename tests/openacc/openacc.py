@@ -111,9 +111,9 @@ def main() -> int:
             # Through a file, as a recording would come; the delay of the accelerations is put in before it.
             path = Path(folder) / "drive.csv"
             undelayed = series.copy()
-            for i, s in enumerate(made.model.signals):
-                if s.csv_delay:
-                    undelayed[: -s.csv_delay, i] = series[s.csv_delay :, i]
+            for i, signal in enumerate(made.model.signals):
+                if signal.csv_delay:
+                    undelayed[: -signal.csv_delay, i] = series[signal.csv_delay :, i]
             with path.open("w", newline="") as file:
                 writer = csv.writer(file)
                 writer.writerow([s.name for s in made.model.signals])

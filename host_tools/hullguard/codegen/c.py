@@ -343,8 +343,8 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     for part, cols, about in (("output", order, "residual from state"), ("direct", width, "residual from signals")):
         lines += table("hg_real", f"{n}_{part}", f"{residuals}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
     lines += _taps(g, n)
-    for part, about in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
-        rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {about}"
+    for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
+        rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {start}"
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
     lines += table("hg_real", f"{n}_tail_input", f"{width}", [reals(g.tail_input)], "weight of a radius older than the taps")
     lines += table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")

@@ -37,10 +37,11 @@ def read_recording(path: Path, model: Model) -> Array:
     if TIME in header:
         _check_time(path, body, header.index(TIME), model.sample_time_s)
     data = np.array([[_number(path, line, r, s, c) for s, c in columns.items()] for line, r in body])
-    for i, s in enumerate(model.signals):
-        if s.csv_delay:
-            data[:, i] = np.concatenate([np.full(s.csv_delay, data[0, i]), data[: -s.csv_delay, i]])
-    return data
+    # A reading that shows an earlier row exists only from there on: sample 0 is the first row at which all do.
+    latest = max(s.csv_delay for s in model.signals)
+    if latest >= len(data):
+        raise InputError(f"{path.name}: {len(data)} rows, fewer than the delay of {latest} that the model gives a signal")
+    return np.column_stack([data[latest - s.csv_delay : len(data) - s.csv_delay, i] for i, s in enumerate(model.signals)])
 
 
 def _number(path: Path, line: int, row: list[str], name: str, column: int) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -119,14 +119,12 @@ def _ends(y: Array) -> tuple[Array, Array]:
     return np.fmin.reduceat(y, edges), np.fmax.reduceat(y, edges)
 
 
-def line(ax: Axes, t: Array, y: Array, color: str, step: bool = False, width: float = 1.1, order: float = 2.0) -> None:
-    """A line; of a long run the least and the largest of each column."""
+def line(ax: Axes, t: Array, y: Array, color: str, step: bool = False, width: float = 1.1, order: float = 2.0, alpha: float = 0.75) -> None:
+    """A line; of a long run the area between the least and the largest of each column, as dense as `alpha`."""
     y = np.where(np.isfinite(y), y, np.nan)
     if _is_long(len(y)):
         low, high = _ends(y)
-        t = np.repeat(t[_edges(len(t), BINS)], 2)
-        y = np.column_stack([low, high]).ravel()
-        ax.plot(t, y, color=color, lw=min(width, 0.6), zorder=order)
+        ax.fill_between(t[_edges(len(t), BINS)], low, high, facecolor=to_rgba(color, alpha), edgecolor=to_rgba(color, min(1.0, alpha + 0.2)), lw=0.5, zorder=order)
     elif step:
         ax.step(t, y, where="post", color=color, lw=width, zorder=order)
     else:
@@ -262,7 +260,7 @@ def draw_residual(ax: Axes, run: Run, w: Window, r: Residual) -> None:
     J = np.where(np.isfinite(r.J[rows]), r.J[rows], 10 * top)
     band(ax, t, np.maximum(-J, -2 * top), np.minimum(J, 2 * top), SKY, 0.17, 1.0)
     for sign in (1.0, -1.0):
-        line(ax, t, sign * np.minimum(J, 2 * top), INK, width=0.8, order=2.2)
+        line(ax, t, sign * np.minimum(J, 2 * top), INK, width=0.8, order=2.2, alpha=0.3)
     line(ax, t, np.clip(r.r[rows], -2 * top, 2 * top), BLUE, width=1.2, order=2.5)
     ax.set_ylim(-top, top)
     _number_ticks(ax)
@@ -489,7 +487,7 @@ def load_figure(run: Run, w: Window) -> Figure:
     bound, mean = 100 * float(frames["load_bound"]), 100 * float(frames["load_mean"])
     band(ax, t, np.zeros(w.size), load[w.rows], BLUE, 0.18)
     line(ax, t, load[w.rows], BLUE, width=1.3)
-    ax.axhline(periodic, color=AMBER, lw=1.3, ls=(0, (5, 2)), zorder=2)
+    ax.axhline(periodic, color=AMBER, lw=1.5, ls=(0, (5, 2)), zorder=3.5)
     ax.axhline(bound, color=INK, lw=1.2, ls=(0, (1.5, 1.5)), zorder=2)
     ax.set_ylim(0, 1.12 * max(periodic, bound, float(np.nanmax(load, initial=0.0)), 1e-9))
     _number_ticks(ax, 5)
@@ -599,8 +597,8 @@ def draw_signal(ax: Axes, run: Run, w: Window, s: SignalRun) -> None:
     cut = bool(np.any(low < bottom) or np.any(high > top))
     span = top - bottom
     band(ax, t, np.clip(low, bottom - span, top + span), np.clip(high, bottom - span, top + span), SKY, 0.38)
-    line(ax, t, value, BLUE, step=True, width=1.1, order=2.2)
-    line(ax, t, reading, INK, width=0.8, order=2.4)
+    line(ax, t, value, BLUE, step=True, width=1.1, order=2.2, alpha=0.35)
+    line(ax, t, reading, INK, width=0.8, order=2.4, alpha=0.3)
     ax.set_ylim(bottom, top)
     _number_ticks(ax)
     name, unit = unit_of(s.name)

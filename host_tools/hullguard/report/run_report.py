@@ -168,7 +168,7 @@ def headline(run: Run) -> str:
     else:
         found = [f for f in run.faults if f.detected is not None]
         slowest = max((delay_of(f) or 0.0 for f in found), default=0.0)
-        first = f"{len(found)} of {len(run.faults)} faults were found" + (f", the slowest after {_delay(run, slowest)}" if found else "")
+        first = f"{len(found)} of {len(run.faults)} faults {'was' if len(found) == 1 else 'were'} found" + (f", {'the slowest after ' if len(found) > 1 else 'after '}{_delay(run, slowest)}" if found else "")
     if not any(false):
         second = "no false alarm"
     else:
