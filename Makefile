@@ -167,5 +167,5 @@ $(foreach t,$(TOOLSETS),$(foreach r,$(RIGS),$(eval $(call contract_program,$(t),
 
 # --- parts of other folders --------------------------------------------------------------------------------------------------------------
 
-include $(wildcard firmware/*.mk hal/*.mk hal/*/*.mk host_tools/*.mk tests/*.mk tests/*/*.mk)
+include $(wildcard firmware/*.mk firmware/*/*.mk hal/*.mk hal/*/*.mk host_tools/*.mk tests/*.mk tests/*/*.mk)
 -include $(OBJECTS:.o=.d)

@@ -81,6 +81,7 @@ static const char usage[] =
     "  --samples N        stop after N samples (0: never)\n"
     "  --status           print a line of status every second\n"
     "  --timing FILE      when done, write the missed deadlines to FILE\n"
+    "  --list             print the models compiled in, each with its hash, and end\n"
     "  --help, --version\n"
     "Prints 'ready' when it listens. SIGINT and SIGTERM end it. Exit status: 0 done, 1 failed, 2 bad option, 3 the bus cannot be opened.\n";
 
@@ -133,9 +134,17 @@ enum {
     OPTION_SAMPLES,
     OPTION_STATUS,
     OPTION_TIMING,
+    OPTION_LIST,
     OPTION_HELP,
     OPTION_VERSION
 };
+
+static void list_models(void)
+{
+    for (size_t i = 0U; app_model_at(i) != NULL; i++) {
+        (void)printf("%s %08lx\n", app_model_at(i)->name, (unsigned long)app_model_at(i)->config->model_hash);
+    }
+}
 
 /* -1: go on; else the exit status. */
 static int take_option(options *self, int option, const char *value)
@@ -165,6 +174,9 @@ static int take_option(options *self, int option, const char *value)
     case OPTION_TIMING:
         self->timing = value;
         return -1;
+    case OPTION_LIST:
+        list_models();
+        return EXIT_SUCCESS;
     case OPTION_HELP:
         (void)fputs(usage, stdout);
         return EXIT_SUCCESS;
@@ -184,7 +196,8 @@ static int read_options(options *self, int argc, char **argv)
         {"period", required_argument, NULL, OPTION_PERIOD},     {"deadline", required_argument, NULL, OPTION_DEADLINE},
         {"samples", required_argument, NULL, OPTION_SAMPLES},   {"status", no_argument, NULL, OPTION_STATUS},
         {"timing", required_argument, NULL, OPTION_TIMING},     {"help", no_argument, NULL, OPTION_HELP},
-        {"version", no_argument, NULL, OPTION_VERSION},         {NULL, 0, NULL, 0},
+        {"version", no_argument, NULL, OPTION_VERSION},         {"list", no_argument, NULL, OPTION_LIST},
+        {NULL, 0, NULL, 0},
     };
     *self = (options){.model = app_model_at(0U), .interface = "vcan0", .how = HG_START_MOVING, .slack_us = UINT64_MAX};
     int result = -1;

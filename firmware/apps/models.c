@@ -1,11 +1,12 @@
 #include "models.h"
 
+#include "openacc.h"
 #include "platoon.h"
 
 #include <string.h>
 
 /* One line a model: its name as its generated header writes it, in lower and in upper case. */
-#define MODELS(X) X(platoon, PLATOON)
+#define MODELS(X) X(platoon, PLATOON) X(openacc, OPENACC)
 
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_node name##_node;                                        \

@@ -26,10 +26,15 @@ hg_status hg_decision_start(hg_decision *self, const hg_decision_config *config,
     return HG_OK;
 }
 
+static void forget(hg_alarm *alarm)
+{
+    *alarm = (hg_alarm){.state = HG_PLANT_NONE, .up = 0U, .down = 0U, .pending = 0U};
+}
+
 void hg_decision_reset(hg_decision *self)
 {
     for (uint8_t g = 0U; g < self->config->generators; g++) {
-        self->alarm[g] = (hg_alarm){.state = HG_PLANT_NONE, .up = 0U, .down = 0U, .pending = 0U};
+        forget(&self->alarm[g]);
     }
 }
 
@@ -51,24 +56,24 @@ static void count(hg_alarm *alarm, const hg_decision_config *config, bool raised
 
 static void alarm_step(hg_alarm *alarm, const hg_decision_config *config, uint8_t feeds, bool raised, const hg_evidence *evidence)
 {
-    if ((alarm->state == HG_PLANT_PROVISIONAL) && ((alarm->pending & evidence->rewound) != 0U)) {
-        alarm->state = HG_PLANT_NONE; /* raised with radii that were too small; judged anew below */
-        alarm->up = 0U;
+    const bool was_confirmed = alarm->state == HG_PLANT_CONFIRMED;
+    const uint8_t doubt = feeds & evidence->doubt;
+    if ((!was_confirmed) && ((alarm->pending & evidence->rewound) != 0U)) {
+        forget(alarm); /* raised, or counted, with radii that were too small; judged anew below */
     }
+    alarm->pending &= doubt; /* a group that is no longer in doubt has settled what relied on it */
     count(alarm, config, raised);
     if (alarm->state == HG_PLANT_NONE) {
+        alarm->pending = raised ? (alarm->pending | doubt) : 0U;
         if (alarm->up >= config->up) {
             alarm->state = HG_PLANT_PROVISIONAL;
-            alarm->pending = feeds & evidence->doubt;
         }
-    } else {
-        alarm->pending &= evidence->doubt;
     }
     if ((alarm->state == HG_PLANT_PROVISIONAL) && (alarm->pending == 0U)) {
         alarm->state = HG_PLANT_CONFIRMED;
     }
-    if ((alarm->state == HG_PLANT_CONFIRMED) && (alarm->down >= config->down) && (!config->latch)) {
-        alarm->state = HG_PLANT_NONE;
+    if (was_confirmed && (alarm->down >= config->down) && (!config->latch)) {
+        forget(alarm); /* was confirmed before: a confirmed alarm is seen for a sample at least */
     }
 }
 
@@ -76,15 +81,22 @@ hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32
 {
     const hg_decision_config *config = self->config;
     hg_plant plant = evidence->ready ? HG_PLANT_NONE : HG_PLANT_STARTING;
-    uint32_t common = UINT32_MAX;
+    uint32_t common = 0U;
     for (uint8_t g = 0U; g < config->generators; g++) {
         hg_alarm *alarm = &self->alarm[g];
         alarm_step(alarm, config, config->feeds[g], ((evidence->alarm >> g) & 1U) != 0U, evidence);
         if (alarm->state != HG_PLANT_NONE) {
-            common &= config->faults[g];
-            plant = (alarm->state > plant) ? alarm->state : plant;
+            /* A provisional alarm may yet be taken back: it must not narrow what confirmed ones say. */
+            if (alarm->state > plant) {
+                plant = alarm->state;
+                common = config->faults[g];
+            } else if (alarm->state == plant) {
+                common &= config->faults[g];
+            } else {
+                /* a provisional one beside a confirmed one */
+            }
         }
     }
-    *candidates = (plant >= HG_PLANT_PROVISIONAL) ? common : 0U;
+    *candidates = common;
     return plant;
 }

@@ -90,12 +90,12 @@ static void tail_step(hg_hull *self, const hg_radii *ring)
 {
     const hg_hull_config *config = self->config;
     const hg_real *leaving = &ring->data[(uint16_t)row_of(ring, config->taps) * ring->width];
-    hg_real widest = HG_REAL_ZERO;
+    hg_acc sum = hg_acc_zero();
     for (uint8_t g = 0U; g < config->width; g++) {
-        widest = hg_real_max(widest, hg_real_mul(config->tail_input[g], leaving[config->signal[g]]));
+        sum = hg_acc_mac(sum, config->tail_input[g], leaving[config->signal[g]]);
     }
     /* Held finite: an infinite theta would never heal. */
-    self->theta = hg_real_min(hg_real_mul(config->decay, self->theta) + widest, HG_REAL_MAX);
+    self->theta = hg_real_min(hg_real_mul(config->decay, self->theta) + hg_acc_real(sum, 0), HG_REAL_MAX);
 }
 
 void hg_hull_step(hg_hull *self, const hg_radii *ring, hg_real *J)

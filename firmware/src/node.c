@@ -328,10 +328,10 @@ uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_
     }
     if (changed || beat) {
         self->reported = true;
-        self->silence = 0U;
         self->last = *verdict;
     }
     if (beat) {
+        self->silence = 0U;
         put_status(self, verdict, &frame[1]);
         frames = 2U;
     }

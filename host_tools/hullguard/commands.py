@@ -212,9 +212,9 @@ def _drive(args: argparse.Namespace, made: Design, native: Native, source: Sourc
     result = summary(made, native, trace, faults, facts)
     if out is not None:
         write_files(out, made, native, trace, faults, result)
-        from hullguard.codegen import write_dbc
+        from hullguard.codegen.dbc import emit_dbc
 
-        write_dbc(made, out)
+        (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
         if INSIDE not in os.environ:
             _report(args, out)
     _tell(args, result)

@@ -13,6 +13,7 @@ import cantools
 import numpy as np
 import pytest
 from cantools.database.can import Database, Message
+
 from hullguard.codegen import emit_c, emit_dbc, write_all
 from hullguard.codegen.c import detector_reals, fill, real
 from hullguard.codegen.dbc import short
@@ -422,9 +423,7 @@ def test_long_rows_are_spread_evenly() -> None:
     assert sum(line.count("HG_REAL_C") for line in lines) == 13
 
 
-@pytest.mark.parametrize(
-    ("group", "message"), [("Status", "the detector's own frame"), ("Measure-ment", "'measure ment' and 'Measure-ment' have the same identifier")]
-)
+@pytest.mark.parametrize(("group", "message"), [("Status", "the detector's own frame"), ("Measure-ment", "'Measure-ment' have the same identifier")])
 def test_names_that_would_collide_are_refused(designs: dict[str, Design], group: str, message: str) -> None:
     d = designs["platoon"]
     first, second = d.tables.groups
@@ -462,9 +461,7 @@ def test_header_is_cpp_too(designs: dict[str, Design], tmp_path: Path) -> None:
     subprocess.run(["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{ROOT}/firmware/include", "-fsyntax-only", str(tmp_path / "use.cpp")], check=True)
 
 
-@pytest.mark.parametrize(
-    ("limit", "least"), [("HG_GROUPS_MAX", 3), ("HG_GROUP_SIGNALS_MAX", 3), ("HG_LEVELS_MAX", 3), ("HG_GENERATORS_MAX", 2)]
-)
+@pytest.mark.parametrize(("limit", "least"), [("HG_GROUPS_MAX", 3), ("HG_GROUP_SIGNALS_MAX", 3), ("HG_LEVELS_MAX", 3), ("HG_GENERATORS_MAX", 2)])
 def test_too_small_a_limit_is_an_error_that_names_it(designs: dict[str, Design], tmp_path: Path, limit: str, least: int) -> None:
     write_all(designs["tank"], tmp_path)
     command = ["gcc", "-std=c11", f"-I{ROOT}/firmware/include", "-fsyntax-only", str(tmp_path / "tank.c")]

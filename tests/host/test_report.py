@@ -62,8 +62,8 @@ class Checker(HTMLParser):
         assert tag not in ("script", "iframe", "object", "embed", "link", "base"), tag
         names = [n for n, _ in attrs]
         assert len(names) == len(set(names)), f"<{tag}> has an attribute twice"
-        for name, value in attrs:
-            value = value or ""
+        for name, given in attrs:
+            value = given or ""
             if name == "id":
                 assert value not in self.ids, f"id {value} is there twice"
                 self.ids.add(value)
@@ -370,10 +370,10 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "empty csv": (lambda d: _put(d / "signals.csv", ""), r"signals\.csv: empty"),
     "only names": (edit_csv(lambda lines: lines[:1]), r"signals\.csv: no samples"),
     "word in csv": (
-        edit_csv(lambda lines: lines[:5] + [lines[5].replace(",", ",abc", 1)] + lines[6:]),
+        edit_csv(lambda lines: [*lines[:5], lines[5].replace(",", ",abc", 1), *lines[6:]]),
         r"signals\.csv: line 6, column 'k': 'abc5?4?' is not a number",
     ),
-    "short line": (edit_csv(lambda lines: lines[:5] + [lines[5].rpartition(",")[0]] + lines[6:]), r"signals\.csv: line 6 has \d+ fields"),
+    "short line": (edit_csv(lambda lines: [*lines[:5], lines[5].rpartition(",")[0], *lines[6:]]), r"signals\.csv: line 6 has \d+ fields"),
     "no column k": (edit_csv(without("k")), r"column 'k' is missing"),
     "no threshold": (edit_csv(without("J1.2")), r"column 'J1\.2' is missing"),
     "no radius": (edit_csv(without("gap12_m.radius")), r"column 'gap12_m\.radius' is missing"),

@@ -342,15 +342,18 @@ State Decision::step(const Evidence &evidence)
 
 std::uint32_t Decision::candidates() const
 {
-    bool          any    = false;
-    std::uint32_t common = 0xFFFFFFFFU;
-    for (size_t i = 0; i < judge_.size(); ++i) {
-        if (judge_[i].state != State::none) {
-            any = true;
-            common &= rules_.faults[i];
+    for (const State said : {State::confirmed, State::provisional}) { /* only what is sure narrows what is sure */
+        bool          any    = false;
+        std::uint32_t common = 0xFFFFFFFFU;
+        for (size_t i = 0; i < judge_.size(); ++i) {
+            if (judge_[i].state == said) {
+                any = true;
+                common &= rules_.faults[i];
+            }
         }
+        if (any) { return common; }
     }
-    return any ? common : 0U;
+    return 0U;
 }
 
 } // namespace oracle

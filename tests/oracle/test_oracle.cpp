@@ -414,10 +414,7 @@ bool diagonalisable(const Matrix &A)
 
 Tail tail_of(const System &s, int taps)
 {
-    Tail t = diagonalisable(s.A) ? modal_tail(s, taps) : power_tail(s, taps);
-    /* theta takes the largest of the signals (hull.h), and the hull sums them: every weight must carry the number of signals */
-    t.input *= static_cast<double>(s.B.cols());
-    return t;
+    return diagonalisable(s.A) ? modal_tail(s, taps) : power_tail(s, taps);
 }
 
 /* Tables of a hull. Every table is widened by what the sums of the library can lose (platoon, section 8), then rounded up. */

@@ -193,8 +193,8 @@ static double threshold_by_definition(const hg_real (*past)[SIGNALS], uint32_t k
     double theta = 0.0;
     double power = 1.0;
     for (uint32_t lag = TAPS; lag <= k; lag++) {
-        theta += power * fmax((double)tail_in[0] * (double)past[k - lag][signal_list[0]],
-            (double)tail_in[1] * (double)past[k - lag][signal_list[1]]);
+        theta += power * (((double)tail_in[0] * (double)past[k - lag][signal_list[0]]) +
+                          ((double)tail_in[1] * (double)past[k - lag][signal_list[1]]));
         power *= (double)usual.decay;
     }
     return sum + ((double)tail_out[i] * theta);

@@ -891,12 +891,10 @@ static void every_change_is_told_at_once(void **state)
         }
         assert_int_equal(1, report(&r, &v, false, frame));
         assert_int_equal(0, frame[0].data[2] & 0x10);
-        for (uint32_t k = 3U; k < 7U; k++) {
-            v.k = k;
-            assert_int_equal(0, report(&r, &v, false, frame)); /* the heartbeat counts from there */
+        for (uint32_t k = 3U; k < 8U; k++) {
+            v.k = k; /* the heartbeat keeps its pace, or a flapping bus would starve the status frame */
+            assert_int_equal(((k % HEARTBEAT) == 0U) ? 2 : 0, report(&r, &v, false, frame));
         }
-        v.k = 7U;
-        assert_int_equal(2, report(&r, &v, false, frame));
         v = verdict_of(8U); /* and back */
         assert_int_equal(1, report(&r, &v, false, frame));
     }

@@ -4,8 +4,8 @@
  *  A residual outside its threshold is an alarm: within the stated bounds no fault-free explanation is left. It is provisional while a
  *  group that feeds the generator is in doubt (its radius relied on silence, hold.h). The group's next frame settles it: either no frame was
  *  lost, then the alarm stands, or one was, then the alarm is taken back and judged anew with the corrected radii. Without doubt an
- *  alarm is confirmed at once. Debounce counts samples in a row: up before an alarm counts, down before a confirmed one heals; a latched one
- *  never heals until restart. Not reentrant per instance; safe in interrupt context; no allocation. */
+ *  alarm is confirmed at once. Debounce counts samples in a row: up before an alarm counts, down before a confirmed one, which shows for a
+ *  sample at least, heals; a latched one never heals until restart. Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_DECISION_H
 #define HULLGUARD_DECISION_H
 
@@ -72,7 +72,8 @@ hg_status hg_decision_start(hg_decision *self, const hg_decision_config *config,
 void hg_decision_reset(hg_decision *self);
 
 /** One sample.
- *  @param[out] candidates  faults that move every generator in alarm; 0 without one. Sound for single faults.
+ *  @param[out] candidates  faults that move every generator whose alarm is confirmed, or, while none is, every one whose alarm is
+ *              provisional; 0 without an alarm. Sound for single faults once confirmed.
  *  Result: state of the plant. Cost: generators x 10 operations. */
 hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32_t *candidates);
 

@@ -5,7 +5,7 @@
  *      J_i(k) = bias_i(k) + sum over lags j < taps of |h_i(j)| radius(k - j) + tail_i(k)
  *
  *  bias: initial state (two tables: started at rest, or in a moving plant), disturbances and all rounding; offline, its last row holds for good.
- *  tail: what lies behind the taps, from above:  theta(k) = decay theta(k-1) + max_g tail_input_g radius_g(k - taps), tail_i = tail_output_i theta;
+ *  tail: what lies behind the taps, from above:  theta(k) = decay theta(k-1) + sum_g tail_input_g radius_g(k - taps), tail_i = tail_output_i theta;
  *  it heals as fast as the generator forgets and never keeps a maximum. All tables are rounded so that J is never below the exact hull.
  *  One ring of past radii (hg_radii) serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
  *  because J is linear in the radii. Not reentrant per instance; safe in interrupt context; no allocation. */

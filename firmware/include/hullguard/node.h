@@ -55,7 +55,7 @@ typedef struct {                       /* flash: one a model, generated */
     uint8_t                   closing;    /* the group whose frame closes the sample */
     const hg_message         *verdict;    /* 8 bytes, no fields: the map stands in frame.h */
     const hg_message         *status;     /* 8 bytes, no fields */
-    uint16_t                  heartbeat;  /* samples between verdict frames when nothing changes, >= 1 */
+    uint16_t                  heartbeat;  /* samples between heartbeats, >= 1 */
     uint32_t                  model_hash;
 } hg_node_config;
 
@@ -100,7 +100,7 @@ typedef struct {                /* RAM: one a node */
     bool            synchronised; /* has a closing frame told which sample is open? */
     bool            slipped;    /* the last closing frame was late */
     bool            reported;   /* has a verdict frame been handed out? */
-    uint16_t        silence;    /* samples since the last verdict frame that was not a mere reply */
+    uint16_t        silence;    /* samples since the last heartbeat */
     hg_verdict      last;       /* the last one of those */
     uint8_t         verdict_counter;
     uint8_t         status_counter;
@@ -138,7 +138,7 @@ void hg_node_overdue(hg_node *self);
  *  @retval HG_E_EMPTY  nothing is due */
 hg_status hg_node_step(hg_node *self, hg_verdict *verdict);
 
-/** Frames to send after a step: a verdict frame when plant, candidates, basis or bus changed, and with every heartbeat, which adds a status frame.
+/** Frames to send after a step: a verdict frame when plant, candidates, basis, bus or refused changed; with every heartbeat one, and a status frame.
  *  @param[in]  reply  answer this step in any case (lockstep)
  *  @param[out] frame  [2]
  *  Result: number of frames, 0 .. 2. */

@@ -253,9 +253,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     top = Table(data, path.name)
     if top.whole("schema", 1, 10_000) != SCHEMA:
         raise top.error("schema", f"this version reads schema {SCHEMA}")
-    name = top.text("name")
-    if not NAME.match(name):
-        raise top.error("name", f"'{name}' is not a lower-case identifier of at most 31 characters")
+    name = _name(top)
     top.text("kind", choices=["linear"])
     sample_time_s = top.number("sample_time_s", 1e-6, 3600.0)
     bus = top.table("bus", optional=True)
@@ -317,10 +315,17 @@ def _unique(names: list[str], where: str) -> None:
         raise InputError(f"{where}: '{twice[0]}' is there twice")
 
 
-def _read_signal(t: Table) -> Signal:
+def _name(t: Table, *taken: str) -> str:
     name = t.text("name")
     if not NAME.match(name):
         raise t.error("name", f"'{name}' is not a lower-case identifier of at most 31 characters")
+    if name in taken:
+        raise t.error("name", f"'{name}' is the name of a message of the detector; choose another")
+    return name
+
+
+def _read_signal(t: Table) -> Signal:
+    name = _name(t)
     low, high = (float(v) for v in t.vector("range", 2))
     if not low < high:
         raise t.error("range", f"{low:g} is not below {high:g}")
@@ -408,7 +413,7 @@ def _read_group(t: Table, places: tuple[int, ...], members: list[Signal]) -> Gro
         margin = t.whole("margin", 0, 64, 4)
         empty = np.zeros((1, width))
         trigger = Trigger(empty, empty, (0,), 1, empty, margin)
-    group = Group(t.text("name"), places, frame, trigger, transmission == "tick", applied)
+    group = Group(_name(t, "verdict", "status"), places, frame, trigger, transmission == "tick", applied)
     t.close()
     return group
 
@@ -453,7 +458,7 @@ def _pair(t: Table, key: str, low: float, high: float, default: float | None = N
 
 
 def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
-    name, signal = t.text("name"), t.text("signal")
+    name, signal = _name(t), t.text("signal")
     places = [i for i, s in enumerate(signals) if s.name == signal]
     if not places:
         raise t.error("signal", f"'{signal}' is not a declared signal")

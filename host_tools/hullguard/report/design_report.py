@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
-from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from hullguard.bus.bits import worst_bits
 from hullguard.design.design import Design, Generator
@@ -21,7 +21,9 @@ from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC
 LINES = (BLUE, RED, GREEN, PINK, AMBER, SKY, MUTED, INK)
 STYLES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
 SIGNALS_MAX = 8  # signals with a line of their own in the picture of the impulse response
+OPEN_MAX = 4  # generators that are not folded away
 LARGE = 12  # columns from which a matrix is folded away
+SMALLEST = "Smallest lasting step that reaches the steady threshold, in the signal's unit; ready in samples."
 SLEWS_MAX = 6  # columns of the table of slews
 
 
@@ -46,9 +48,15 @@ def _body(design: Design) -> Iterator[str]:
     yield _triggers(design)
     yield "<h2>Faults</h2>"
     yield _faults(design)
+    if len(design.generators) > 1:
+        yield "<h2>Generators</h2>"
+        yield _overview(design)
+    folded = len(design.generators) > OPEN_MAX
     for i, g in enumerate(design.generators):
-        yield f"<h2>Generator {i + 1}</h2>"
+        yield f"<details><summary>Generator {i + 1}: {esc(_reads(design, g))}</summary>" if folded else f"<h2>Generator {i + 1}</h2>"
         yield from _generator(design, i, g)
+        if folded:
+            yield "</details>"
     yield "<h2>Checks</h2>"
     yield _checks(design)
 
@@ -68,11 +76,10 @@ def _summary(design: Design) -> Iterator[str]:
     used = [g for g in design.generators if g.filter.regularised > 0]
     if used:
         names = ", ".join(str(i + 1) for i, g in enumerate(design.generators) if g.filter.regularised > 0)
-        yield f"<aside><p>The factorisation of generator {names} is singular and was regularised with a little noise that no one claims; the thresholds are sound all the same.</p></aside>"
+        told = f"The factorisation of generator {names} is singular and was regularised with a little noise that no one claims; the thresholds are sound all the same."
+        yield f"<aside><p>{told}</p></aside>"
     tiles = [tile("checks", f"{passed} of {len(design.checks)}", "passed", "good" if passed == len(design.checks) else "bad")]
-    tiles.append(
-        tile("bus load, worst case", percent(design.load_bound), f"limit {percent(model.load_max)}", "good" if design.load_bound <= model.load_max else "bad")
-    )
+    tiles.append(tile("bus load, worst case", percent(design.load_bound), f"limit {percent(model.load_max)}", "good" if design.load_bound <= model.load_max else "bad"))
     best = _smallest(design)
     if best:
         name, size = max(best.items(), key=lambda kv: kv[1])
@@ -119,9 +126,7 @@ def _slews(design: Design) -> str:
     slew = design.stored.slew
     horizon = slew.shape[1]
     columns = sorted({int(j) for j in np.unique(np.round(np.geomspace(1, horizon, SLEWS_MAX)))})
-    rows = [
-        [s.name, "declared" if s.slew is not None else "reachable set", *[float(slew[i, j - 1]) for j in columns]] for i, s in enumerate(design.model.signals)
-    ]
+    rows = [[s.name, "declared" if s.slew is not None else "reachable set", *[float(slew[i, j - 1]) for j in columns]] for i, s in enumerate(design.model.signals)]
     return table(["signal", "from", *[f"#{j}" for j in columns]], rows, "Slew: the most a signal can change within so many samples, in its own unit.")
 
 
@@ -158,7 +163,7 @@ def _frames(design: Design) -> str:
                 percent(bits / every / period),
             ]
         )
-    rows.append(["all", "", "", "", None, None, percent(design.load_bound)])
+    rows.append(["all", "", "", "", "", "", percent(design.load_bound)])
     return table(
         ["frame", "identifier", "content", "length", "#most bits", "#at most every (samples)", "#load, worst case"],
         rows,
@@ -180,7 +185,7 @@ def _triggers(design: Design) -> str:
                         g.name if first else "",
                         f"{level}" if place == 0 and t.levels > 1 else "",
                         design.model.signals[i].name,
-                        f"{num(float(g.trigger.delta[level, place]))} |value| + {num(float(g.trigger.sigma[level, place]))}",
+                        _promise(float(g.trigger.delta[level, place]), float(g.trigger.sigma[level, place])),
                         f"{t.silence[level]}",
                         t.interval_max if first else "",
                         t.interval_max + t.margin if first else "",
@@ -193,19 +198,40 @@ def _triggers(design: Design) -> str:
     )
 
 
+def _promise(delta: float, sigma: float) -> str:
+    return num(sigma) if delta == 0 else f"{num(delta)} |value| + {num(sigma)}"
+
+
 def _faults(design: Design) -> str:
     rows = []
     best = _smallest(design)
     for i, f in enumerate(design.model.faults):
         seen = [str(k + 1) for k, t in enumerate(design.tables.generators) if t.faults >> i & 1]
         asked = best.get(f.name)
-        rows.append(
-            [f.name, f.type, design.model.signals[f.signal].name, ", ".join(seen) or Cell("none", "bad"), "not asked for" if asked is None else num(asked)]
-        )
+        rows.append([f.name, f.type, design.model.signals[f.signal].name, ", ".join(seen) or Cell("none", "bad"), "not asked for" if asked is None else num(asked)])
     return (
         table(["fault", "type", "signal", "shows in generators", "#smallest size found"], rows)
         if rows
         else "<p>The model names no faults: any deviation from the model is one.</p>"
+    )
+
+
+def _reads(design: Design, g: Generator) -> str:
+    model = design.model
+    places = [model.outputs[k] for k in g.spec.outputs] + [model.inputs[k] for k in g.spec.inputs]
+    return ", ".join(model.signals[k].name for k in places)
+
+
+def _overview(design: Design) -> str:
+    rows = []
+    for i, g in enumerate(design.generators):
+        found = ", ".join(f"{design.model.faults[f].name} {num(float(size))}" for f, size in zip(g.spec.faults, g.smallest, strict=True))
+        t = g.tables
+        rows.append([i + 1, _reads(design, g), g.spec.order, t.weight.shape[1], found or "–", t.weight.shape[0], t.ready_rest, t.ready_moving])
+    return table(
+        ["#", "reads", "#order", "#residuals", "smallest faults found", "#taps", "#ready from rest", "#in motion"],
+        rows,
+        SMALLEST,
     )
 
 
@@ -214,13 +240,12 @@ def _faults(design: Design) -> str:
 
 def _generator(design: Design, i: int, g: Generator) -> Iterator[str]:
     model = design.model
-    outputs = [model.signals[model.outputs[k]].name for k in g.spec.outputs]
-    inputs = [model.signals[model.inputs[k]].name for k in g.spec.inputs]
-    names = outputs + inputs
+    names = _reads(design, g).split(", ")
     residuals = g.tables.weight.shape[1]
     feeds = [group.name for k, group in enumerate(model.groups) if design.tables.generators[i].feeds >> k & 1]
+    sources = ", ".join(feeds) or "no group"
     yield (
-        f"<p>Order {g.spec.order} for {plural(model.plant.n, 'state')}, {plural(residuals, 'residual')}; reads {esc(', '.join(names))}; fed by {esc(', '.join(feeds) or 'no group')}. "
+        f"<p>Order {g.spec.order} for {plural(model.plant.n, 'state')}, {plural(residuals, 'residual')}; reads {esc(', '.join(names))}; fed by {esc(sources)}. "
         f"Search: {plural(g.spec.search.trials, 'trial')}, seed {g.spec.search.seed}, poles {num(g.spec.search.poles[0])} .. {num(g.spec.search.poles[1])}.</p>"
     )
     if g.filter.regularised > 0:
@@ -271,9 +296,7 @@ def _composition(names: list[str], g: Generator) -> str:
     rows = []
     for i in range(len(g.tables.steady)):
         J = float(g.tables.steady[i])
-        rows.append(
-            [f"residual {i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)]
-        )
+        rows.append([f"residual {i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)])
     return table(
         ["", "#steady J", "#disturbance", *[f"#events of {names[s]}" for s in shown], "#rounding"],
         rows,
@@ -311,7 +334,8 @@ def _response_figure(g: Generator, names: list[str]) -> Figure:
             )
         ax.set_yscale("log")
         ax.set_ylim(floor / 1.5, 2.0 * float(weight.max()))
-        ax.set_xlim(-0.5, taps - 0.5)
+        ax.set_xlim(-0.5, max(int(np.flatnonzero(weight.max((1, 2)) > 0).max(initial=0)), 4) + 0.5)
+        ax.xaxis.set_major_locator(MaxNLocator(8, integer=True))
         ax.set_title(f"residual {i + 1}", loc="left", fontweight="bold")
         ax.set_xlabel("lag j (samples)")
         if i % columns == 0:
@@ -380,13 +404,14 @@ def _bias_figure(g: Generator) -> Figure:
             ax.plot(np.arange(settle), values[:, i], color=color, ls=style, lw=1.3)
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.yaxis.set_major_formatter(ScalarFormatter())
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
     ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.set_xlim(0, max(settle - 1, 1, 1.05 * g.tables.ready_moving if g.tables.ready_moving <= 2 * settle else 1))
+    ax.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     marks = ((g.tables.ready_rest, "-"), (g.tables.ready_moving, (0, (5, 2))))
     for at, style in marks:
-        if at < settle:
+        if at <= ax.get_xlim()[1]:
             ax.axvline(at, color=INK, lw=0.9, ls=style, zorder=1.5)
-    ax.set_xlim(0, max(settle - 1, 1))
     ax.set_xlabel("samples since the start")
     ax.set_ylabel("constant part of J")
     handles: list[Line2D | Patch] = [Line2D([], [], color=LINES[i % len(LINES)], lw=1.4, label=f"residual {i + 1}") for i in range(min(residuals, 6))]
@@ -409,17 +434,16 @@ def _bias_figure(g: Generator) -> Figure:
 def _bias_caption(g: Generator) -> str:
     t = g.tables
     return (
-        f"Left: poles in the unit circle. Right: the part of the threshold that does not depend on what was received; it falls as the initial state is forgotten and stays constant after {t.rest.shape[0]} samples. "
-        f"Ready after {t.ready_rest} samples from a start at rest, {t.ready_moving} from a start in motion."
+        f"Left: poles in the unit circle. Right: the part of the threshold that does not depend on what was received; it falls as the initial state "
+        f"is forgotten and stays constant after {t.rest.shape[0]} samples. "
+        f"Ready after {plural(t.ready_rest, 'sample')} from a start at rest, {t.ready_moving} from a start in motion."
     )
 
 
 def _poles(g: Generator) -> str:
     def listed(a: Array) -> str:
         values = sorted(np.linalg.eigvals(a), key=lambda p: (-round(abs(p), 9), p.imag))
-        return ", ".join(
-            num(float(p.real)) + ("" if abs(p.imag) < 1e-12 else (" + " if p.imag > 0 else " − ") + f"{num(abs(float(p.imag)))} j") for p in values
-        )
+        return ", ".join(num(float(p.real)) + ("" if abs(p.imag) < 1e-12 else (" + " if p.imag > 0 else " − ") + f"{num(abs(float(p.imag)))} j") for p in values)
 
     return table(["", "poles"], [["G", listed(g.observer.G)], ["G − Lo W, float32", listed(g.linear.state)]])
 

@@ -41,7 +41,7 @@ class LiveTable:
         self._next = 0.0
         self._began = 0.0
         self._worst = [0.0] * len(self._residuals)
-        self._view: tuple[int, list[float], list[float], list[float], str, dict[str, str], int] | None = None
+        self._view: tuple[int, Sequence[float], Sequence[float], Sequence[float], str, Mapping[str, str], int] | None = None
 
     def __enter__(self) -> Self:
         """Start drawing."""
@@ -72,7 +72,7 @@ class LiveTable:
         self._said = (plant, ())
         if now < self._next and not (changed and now >= self._next - PERIOD_S / 2):
             # Kept as it is: copying every sample would cost more than the sample itself.
-            self._view = (k, values, radii, ratios, plant, bus, frames)  # type: ignore[assignment]
+            self._view = (k, values, radii, ratios, plant, bus, frames)
             return
         self._view = (k, list(values), list(radii), list(ratios), plant, dict(bus), frames)
         self._next = now + PERIOD_S
@@ -96,9 +96,7 @@ class LiveTable:
         narrow = self.console.width < 72
         head = Table.grid(padding=(0, 2))
         rate = (k + 1) / max(time.monotonic() - self._began, 1e-9)
-        bar = ProgressBar(
-            total=self._samples or None, completed=k + 1, width=BAR, pulse=not self._samples, style="bright_black", complete_style="blue", finished_style="blue"
-        )
+        bar = ProgressBar(total=self._samples or None, completed=k + 1, width=BAR, pulse=not self._samples, style="bright_black", complete_style="blue", finished_style="blue")
         head.add_row(
             Text(self._model, style="bold"),
             bar,
@@ -138,9 +136,9 @@ class LiveTable:
         table.add_column("|r|/J now", min_width=BAR)
         table.add_column("", justify="right", min_width=5)
         table.add_column("most", justify="right", min_width=5)
-        order = range(len(self._residuals))
+        order = list(range(len(self._residuals)))
         if len(self._residuals) > ROWS_MAX:
-            order = sorted(order, key=lambda i: -self._worst[i])[:ROWS_MAX]  # type: ignore[assignment]
+            order = sorted(order, key=lambda i: -self._worst[i])[:ROWS_MAX]
         for i in sorted(order):
             ratio = ratios[i] if i < len(ratios) else 0.0
             full = round(min(ratio, 1.0) * BAR)

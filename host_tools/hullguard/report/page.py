@@ -188,8 +188,9 @@ def svg(figure: Figure, name: str, label: str) -> str:
 
 
 def _short(path: str) -> str:
-    """Path data with hundredths of a point."""
-    rounded = re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), path)
+    """Path data with hundredths of a point; long curves with tenths, which no screen shows."""
+    places = 1 if len(path) > 6000 else 2
+    rounded = re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.{places}f}".rstrip("0").rstrip("."), path)
     return re.sub(r"\s+", " ", rounded).strip()
 
 

@@ -131,14 +131,14 @@ def line(ax: Axes, t: Array, y: Array, color: str, step: bool = False, width: fl
         ax.plot(t, y, color=color, lw=width, zorder=order)
 
 
-def band(ax: Axes, t: Array, low: Array, high: Array, color: str, alpha: float, order: float = 1.5) -> None:
+def band(ax: Axes, t: Array, low: Array, high: Array, color: str, alpha: float, order: float = 1.5, step: bool = True) -> None:
     """The area between two lines."""
     if _is_long(len(low)):
         low, high = _ends(low)[0], _ends(high)[1]
         t = t[_edges(len(t), BINS)]
         ax.fill_between(t, low, high, color=color, alpha=alpha, lw=0, zorder=order)
     else:
-        ax.fill_between(t, low, high, step="post", color=color, alpha=alpha, lw=0, zorder=order)
+        ax.fill_between(t, low, high, step="post" if step else None, color=color, alpha=alpha, lw=0, zorder=order)
 
 
 def _number_ticks(ax: Axes, count: int = 4) -> None:
@@ -173,6 +173,12 @@ def _top(run: Run, legend: float = 0.24, heading: bool = True) -> float:
     return legend + names + (0.24 if heading else 0.1)
 
 
+def _label(ax: Axes, text: str, at: float, points: float) -> None:
+    """The name of a fault, above the axes."""
+    where = ax.get_xaxis_transform()
+    ax.annotate(text, (at, 1.0), xycoords=where, xytext=(0, points), textcoords="offset points", ha="center", va="bottom", color=PINK, fontweight="bold")
+
+
 def mark_faults(ax: Axes, run: Run, w: Window, labels: bool = False, above: float = 15.0) -> None:
     """Fault intervals as shaded areas, detection dashed, confirmation solid."""
     low, high = ax.get_xlim()
@@ -190,18 +196,7 @@ def mark_faults(ax: Axes, run: Run, w: Window, labels: bool = False, above: floa
             row = next((i for i, x in enumerate(taken) if start - x > 0.035 * (high - low)), None)
             if row is not None:
                 taken[row] = start
-                ax.annotate(
-                    f.label,
-                    (start, 1.0),
-                    xycoords=("data", "axes fraction"),
-                    xytext=(0, above + 10 * row),
-                    textcoords="offset points",
-                    ha="center",
-                    va="bottom",
-                    color=PINK,
-                    fontweight="bold",
-                    annotation_clip=False,
-                )
+                _label(ax, f.label, start, above + 10 * row)
 
 
 def fault_legend(run: Run) -> list[Artist]:
@@ -221,7 +216,10 @@ def fault_legend(run: Run) -> list[Artist]:
 
 
 def chosen_residuals(run: Run, count: int = PANELS) -> tuple[list[Residual], int, int]:
-    """Residuals worth a panel: of the generators that alarmed, the first to alarm first, then those closest to it; and how many residuals and generators are left out."""
+    """Residuals worth a panel, and how many residuals and generators are left out.
+
+    First the generators that alarmed, the first to alarm first, then those that came closest to it.
+    """
     rank: dict[int, tuple[float, float]] = {}
     for r in run.residuals:
         over = np.flatnonzero(r.ratio > 1.0)
@@ -248,7 +246,8 @@ def _residual_limit(r: Residual, w: Window, plant: Array) -> float:
     J = r.J[rows][running & np.isfinite(r.J[rows])]
     J = J if len(J) else r.J[rows][np.isfinite(r.J[rows])]
     usual = float(np.quantile(J, 0.98)) if len(J) else 1.0
-    largest = float(np.nanmax(np.abs(np.where(np.isfinite(r.r[rows]), r.r[rows], 0.0)))) if w.size else 0.0
+    alarming = np.abs(r.r[rows][r.ratio[rows] > 1.0])
+    largest = float(alarming.max(initial=0.0))
     return max(1.35 * usual, min(1.1 * largest, 4.0 * usual), 1e-12)
 
 
@@ -258,7 +257,7 @@ def draw_residual(ax: Axes, run: Run, w: Window, r: Residual) -> None:
     _limits(ax, run, w)
     top = _residual_limit(r, w, run.plant)
     J = np.where(np.isfinite(r.J[rows]), r.J[rows], 10 * top)
-    band(ax, t, np.maximum(-J, -2 * top), np.minimum(J, 2 * top), SKY, 0.17, 1.0)
+    band(ax, t, np.maximum(-J, -2 * top), np.minimum(J, 2 * top), SKY, 0.17, 1.0, step=False)
     for sign in (1.0, -1.0):
         line(ax, t, sign * np.minimum(J, 2 * top), INK, width=0.8, order=2.2, alpha=0.3)
     line(ax, t, np.clip(r.r[rows], -2 * top, 2 * top), BLUE, width=1.2, order=2.5)
@@ -316,49 +315,36 @@ def ratio_figure(run: Run, w: Window) -> Figure:
     drawn.outline.set_visible(False)
     bar.set_ylabel("|r| / J")
     _limits(ax, run, w)
-    # The areas would tint the colours: lines only.
-    for f in run.faults:
-        if low <= run.at(f.start) <= high:
-            ax.axvline(run.at(f.start), color=PINK, lw=1.2)
-        if f.detected is not None and low <= run.at(f.detected) <= high:
-            ax.axvline(run.at(f.detected), color=RED, lw=1.2, ls=(0, (4, 2)))
     mark_faults_above(ax, run)
     handles: list[Artist] = [Patch(facecolor="#f08c00", label="above its threshold")]
-    if run.faults:
-        handles.append(Line2D([], [], color=PINK, lw=1.4, label="fault begins"))
     if any(f.detected is not None for f in run.faults):
-        handles.append(Line2D([], [], color=RED, lw=1.4, ls=(0, (4, 2)), label="detected"))
+        handles.append(Line2D([], [], color=RED, marker="v", ls="", ms=5, mew=0, label="detected"))
     sheet.legend(handles)
     return sheet.figure
 
 
 def mark_faults_above(ax: Axes, run: Run) -> None:
-    """Only the names of the faults, above the axes."""
+    """Names of the faults and instants of detection above the axes, for pictures whose colours must stay as they are."""
     low, high = ax.get_xlim()
     taken = -1e9
+    above = ax.get_xaxis_transform()
     for f in run.faults:
         start = run.at(f.start)
-        if low <= start <= high and start - taken > 0.035 * (high - low):
-            taken = start
-            ax.annotate(
-                f.label,
-                (start, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(0, 3),
-                textcoords="offset points",
-                ha="center",
-                va="bottom",
-                color=PINK,
-                fontweight="bold",
-                annotation_clip=False,
-            )
+        if low <= start <= high:
+            ax.plot([start, start], [1.0, 1.0], "|", color=PINK, ms=9, mew=1.3, transform=above, clip_on=False, zorder=4)
+            if start - taken > 0.035 * (high - low):
+                taken = start
+                _label(ax, f.label, start, 7.0)
+        if f.detected is not None and low <= run.at(f.detected) <= high:
+            mark = above + ScaledTranslation(0.0, 3.5 / 72, ax.figure.dpi_scale_trans)
+            ax.plot([run.at(f.detected)], [1.0], "v", color=RED, ms=5, mew=0, transform=mark, clip_on=False, zorder=5)
 
 
 # --- events --------------------------------------------------------------------------------------------------------------
 
 
 def is_every_sample(g: GroupRun, samples: int) -> bool:
-    """Does a group send with every sample?"""
+    """Whether a group sends with every sample."""
     return g.frames >= samples or (g.interval_max is not None and g.interval_max <= 1)
 
 
@@ -456,7 +442,7 @@ def _draw_histogram(bar: Axes, g: GroupRun, beside: Axes) -> None:
     most = max(counts, default=1)
     bar.set_xlim(0, 1.3 * most)
     bar.xaxis.set_major_locator(MaxNLocator(3, integer=True))
-    if top <= 12:
+    if beside.bbox.height * 72 / beside.figure.dpi > 8 * top:
         for i, c in zip(intervals, counts, strict=True):
             if i < top:
                 bar.text(c + 0.03 * most, i, f"{c}", va="center", ha="left", fontsize=7, color=MUTED)
@@ -485,7 +471,7 @@ def load_figure(run: Run, w: Window) -> Figure:
     t = run.time[w.rows]
     periodic = 100 * float(frames["bits_periodic"]) / (len(run.k) * run.sample_time_s * run.bitrate)
     bound, mean = 100 * float(frames["load_bound"]), 100 * float(frames["load_mean"])
-    band(ax, t, np.zeros(w.size), load[w.rows], BLUE, 0.18)
+    band(ax, t, np.zeros(w.size), load[w.rows], BLUE, 0.18, step=False)
     line(ax, t, load[w.rows], BLUE, width=1.3)
     ax.axhline(periodic, color=AMBER, lw=1.5, ls=(0, (5, 2)), zorder=3.5)
     ax.axhline(bound, color=INK, lw=1.2, ls=(0, (1.5, 1.5)), zorder=2)
@@ -520,7 +506,8 @@ def _bars(ax: Axes, run: Run, w: Window, row: float, state: Array, names: Sequen
     span = stop - float(run.time[w.first])
     for name, (color, ink) in fill.items():
         code = names.index(name)
-        spans = [(float(t[a]), float(b - t[a])) for a, b in zip(starts, ends, strict=True) if state[a] == code]
+        least = 0.004 * span if code > 1 else 0.0  # what matters is seen however short it is
+        spans = [(float(t[a]), max(float(b - t[a]), least)) for a, b in zip(starts, ends, strict=True) if state[a] == code]
         if not spans:
             continue
         ax.broken_barh(spans, (row - 0.36, 0.72), facecolors=color, lw=0, zorder=2)
@@ -563,19 +550,13 @@ def verdict_figure(run: Run, w: Window) -> Figure:
     ax = sheet.add(height, left=_name_margin([f"bus: {g.name}" for g in run.groups]))
     draw_verdict(ax, run, w)
     ax.set_xlabel("time (s)")
-    mark_fault_lines(ax, run)
-    sheet.legend(verdict_legend(run))
-    return sheet.figure
-
-
-def mark_fault_lines(ax: Axes, run: Run) -> None:
-    """Where faults begin and end, over bars that must keep their colours."""
-    low, high = ax.get_xlim()
     for f in run.faults:
         for k in (f.start, f.end):
-            if k is not None and low <= run.at(k) <= high:
-                ax.axvline(run.at(k), color=PINK, lw=1.2, zorder=3)
+            if k is not None and k < run.k[-1]:
+                ax.axvline(run.at(k), color=PINK, lw=1.2, zorder=1)  # behind the bars
     mark_faults_above(ax, run)
+    sheet.legend(verdict_legend(run))
+    return sheet.figure
 
 
 # --- signals -------------------------------------------------------------------------------------------------------------
@@ -643,7 +624,7 @@ def signal_figure(run: Run, w: Window) -> Figure:
 
 def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
     """Residuals, events and verdict below one another."""
-    residuals, _, _ = chosen_residuals(run, count)
+    residuals = near(run, w, chosen_residuals(run)[0], count)
     raster = 0.12 + 0.26 * len(run.groups)
     bars = 0.12 + 0.25 * (1 + len(run.groups))
     sheet = Sheet([1.35] * len(residuals) + [raster, bars], 0.34, _top(run, 0.3), 0.5, 10.0)

@@ -28,10 +28,16 @@ COUNTERS = {
     "overdue": "samples closed without their closing frame",
 }
 GUARANTEE = (
-    "Guaranteed: as long as the plant keeps to the model, its disturbances, noise, initial state, signal ranges and slews stay within the bounds the model states, and no corrupted frame passes its "
-    "end-to-end check, no residual can exceed its threshold, whatever is sent late, lost or not at all; so a confirmed fault means that the plant or one of these bounds is broken."
+    "Guaranteed: as long as the plant keeps to the model, its disturbances, noise, initial state, signal ranges and slews stay within the bounds the model "
+    "states, and no corrupted frame passes its end-to-end check, no residual can exceed its threshold, whatever is sent late, lost or not at all; so a "
+    "confirmed fault means that the plant or one of these bounds is broken."
 )
-LIMITS = "Not guaranteed: that every fault is found (one that stays below the thresholds is not), or that frames are authentic: the check protects against errors, not against an attacker."
+LIMITS = (
+    "Not guaranteed: that every fault is found (one that stays below the thresholds is not), or that frames are authentic: the check protects against errors, "
+    "not against an attacker."
+)
+MOVING = "The threshold moves: it is the largest value a healthy plant can show, given what the detector knows."
+BAND = "The detector works on values and radii only: the true reading has to lie in the band. A sensor's fault is in the reading that is sent, and in the band."
 
 
 def write_run_report(directory: Path) -> Path:
@@ -45,10 +51,11 @@ def write_run_report(directory: Path) -> Path:
 
 
 def write_picture(directory: Path, png_path: Path) -> Path:
-    """Residuals, events and verdict of a run as one PNG, 1200 pixels wide."""
+    """Residuals, events and verdict of a run as one PNG, 1200 pixels wide; of a long run what is around the first fault that was found."""
     run = read_run(directory)
     with mpl.rc_context(RC | {"savefig.facecolor": "white"}):
-        figure = draw.overview_figure(run, draw.whole(run))
+        zoom = draw.close_up(run)
+        figure = draw.overview_figure(run, zoom[0] if zoom else draw.whole(run))
         FigureCanvasAgg(figure)
         try:
             figure.savefig(png_path, format="png", dpi=120, metadata={"Software": None})
@@ -75,7 +82,7 @@ def _body(run: Run) -> Iterator[str]:
     if hidden:
         whose = f" ({plural(generators, 'generator')} as a whole)" if generators else ""
         left = f" {plural(hidden, 'residual')} not drawn here{whose}: those drawn alarmed first or came closest to their thresholds."
-    yield f"<p>A fault is declared when a residual leaves its threshold. The threshold moves: it is the largest value a healthy plant can show, given what the detector knows.{esc(left)}</p>"
+    yield f"<p>A fault is declared when a residual leaves its threshold. {MOVING}{esc(left)}</p>"
     zoom = draw.close_up(run)
     if zoom:
         w, fault = zoom
@@ -129,7 +136,7 @@ def _body(run: Run) -> Iterator[str]:
     yield _load_table(run)
 
     yield "<h2>Signals</h2>"
-    yield "<p>The detector works on values and radii only: the true reading has to lie in the band. A sensor's fault is in the reading that is sent, and in the band.</p>"
+    yield f"<p>{esc(BAND)}</p>"
     if zoom:
         yield picture(draw.signal_figure(run, zoom[0]), "near", f"Signals around fault {zoom[1].label}", f"Around fault {zoom[1].label} ({zoom[1].spec}).")
     yield picture(draw.signal_figure(run, whole), "signals", "Signals as read and as known to the detector", f"The whole run.{long}")
@@ -164,11 +171,15 @@ def headline(run: Run) -> str:
         first = "No fault was injected"
     elif len(run.faults) == 1:
         f, delay = run.faults[0], delay_of(run.faults[0])
-        first = f"{f.spec} began at {_when(run, f.start)} and was " + ("not found" if delay is None else f"found {_delay(run, delay)} later")
+        first = f"{f.spec} began at {_when(run, f.start)} and was " + (
+            "not found" if delay is None else "found in the same sample" if delay == 0 else f"found {_delay(run, delay)} later"
+        )
     else:
         found = [f for f in run.faults if f.detected is not None]
         slowest = max((delay_of(f) or 0.0 for f in found), default=0.0)
-        first = f"{len(found)} of {len(run.faults)} faults {'was' if len(found) == 1 else 'were'} found" + (f", {'the slowest after ' if len(found) > 1 else 'after '}{_delay(run, slowest)}" if found else "")
+        first = f"{len(found)} of {len(run.faults)} faults {'was' if len(found) == 1 else 'were'} found" + (
+            f", {'the slowest after ' if len(found) > 1 else 'after '}{_delay(run, slowest)}" if found else ""
+        )
     if not any(false):
         second = "no false alarm"
     else:
@@ -182,7 +193,9 @@ def _summary(run: Run) -> Iterator[str]:
     info = run.info
     seconds = num(len(run.k) * run.sample_time_s, 5)
     yield f"<h1>hullguard run: {esc(info['model'])}, scenario {esc(info['scenario'])}</h1>"
-    yield f'<p class="note">{len(run.k)} samples, {esc(seconds)} s at {esc(num(run.sample_time_s * 1000))} ms; bus {esc(info["bus"])}; {esc(info["real"])} arithmetic; seed {esc(info["seed"])}; model hash <code>{esc(info["model_hash"])}</code></p>'
+    length = f"{len(run.k)} samples, {seconds} s at {num(run.sample_time_s * 1000)} ms"
+    how = f"bus {info['bus']}; {info['real']} arithmetic; seed {info['seed']}; model hash"
+    yield f'<p class="note">{esc(length)}; {esc(how)} <code>{esc(info["model_hash"])}</code></p>'
     yield f'<p class="lead">{esc(headline(run))}</p>'
     yield '<div class="tiles">' + "".join(_tiles(run)) + "</div>"
     if run.faults:
@@ -208,9 +221,7 @@ def _tiles(run: Run) -> Iterator[str]:
                 yield tile("fault found", "no", "not within this run", "bad")
         else:
             missed = len(run.faults) - len(found)
-            yield tile(
-                "faults found", f"{len(found)} of {len(run.faults)}", "all of them" if not missed else f"{missed} not found", "bad" if missed else "good"
-            )
+            yield tile("faults found", f"{len(found)} of {len(run.faults)}", "all of them" if not missed else f"{missed} not found", "bad" if missed else "good")
         delays = [d for d in (delay_of(f) for f in found) if d is not None]
         if delays:
             mean = sum(delays) / len(delays)
@@ -229,9 +240,7 @@ def _tiles(run: Run) -> Iterator[str]:
         f"of periodic; mean load {percent(frames['load_mean'])}",
     )
     margin = info["margin_max"]
-    yield tile(
-        "largest |r|/J" + (" before the fault" if run.faults else ""), num(margin), "alarm above 1", "" if margin is None else "good" if margin <= 1 else "bad"
-    )
+    yield tile("largest |r|/J" + (" before the fault" if run.faults else ""), num(margin), "alarm above 1", "" if margin is None else "good" if margin <= 1 else "bad")
 
 
 def _fault_table(run: Run) -> str:
@@ -240,9 +249,7 @@ def _fault_table(run: Run) -> str:
         found: object = Cell("not found", "bad") if f.detected is None else f.detected
         delay = delay_of(f)
         until = "end" if f.end is None else f.end
-        rows.append(
-            [f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, ", ".join(f.candidates) or "–"]
-        )
+        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, ", ".join(f.candidates) or "–"])
     return table(["", "fault", "#start", "#until", "#detected", "#confirmed", "#delay (samples)", "#delay (s)", "candidates named"], rows)
 
 
@@ -280,11 +287,7 @@ def _communication(run: Run) -> str:
     if not rows:
         return "<p>No counters.</p>"
     quiet = not any(value for name, value in counters.items() if name != "good" and isinstance(value, (int, float)))
-    lead = (
-        "Nothing was lost, damaged, late or refused."
-        if quiet
-        else "What the detector's receive side met. What is lost, late or refused widens radii; it never raises an alarm."
-    )
+    lead = "Nothing was lost, damaged, late or refused." if quiet else "What the detector's receive side met. What is lost, late or refused widens radii; it never raises an alarm."
     return f"<p>{esc(lead)}</p>" + table(["counter", "#count", "meaning"], rows)
 
 
@@ -292,11 +295,7 @@ def _verdict_table(run: Run) -> Iterator[str]:
     rows = [[k, num(k * run.sample_time_s, 6), plant, ", ".join(f"{g} {h}" for g, h in bus.items())] for k, plant, bus in run.verdicts[:VERDICTS_MAX]]
     more = "" if len(run.verdicts) <= VERDICTS_MAX else f"The first {VERDICTS_MAX} of {len(run.verdicts)}; all are in run.json."
     if rows:
-        yield (
-            f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>"
-            + table(["#sample", "#time (s)", "plant", "bus"], rows, more)
-            + "</details>"
-        )
+        yield (f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>" + table(["#sample", "#time (s)", "plant", "bus"], rows, more) + "</details>")
 
 
 def _facts(run: Run) -> str:

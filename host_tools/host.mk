@@ -1,0 +1,33 @@
+# The host tools: the demo, generated models, the recorded drive, and their tests.
+
+HULLGUARD := .venv/bin/hullguard
+SHIPPED   := $(filter-out %.design,$(patsubst host_tools/models/%.toml,%,$(wildcard host_tools/models/*.toml)))
+
+.PHONY: demo
+demo: ## set up, then run the platoon with a controller fault on the best bus at hand; report in build/demo/
+	@host_tools/setup.sh demo
+	@$(MAKE) lib apps with-vcan
+	@$(HULLGUARD) run platoon --expect detect --out $(BUILD)/demo
+	@echo "look at $(BUILD)/demo/report.html"
+
+.PHONY: models
+models: lib ## generate firmware/models/ from host_tools/models/ again
+	@for m in $(SHIPPED); do $(HULLGUARD) design $$m --quiet --out $(BUILD)/models/$$m || exit 1; \
+	  cp $(BUILD)/models/$$m/$$m.h $(BUILD)/models/$$m/$$m.c $(BUILD)/models/$$m/$$m.dbc firmware/models/; echo "  ok  $$m"; done
+
+.PHONY: openacc
+openacc: ## the openacc model on a recorded drive: make openacc DATA=FILE.csv
+	@host_tools/setup.sh demo
+	@$(MAKE) lib
+	@test -n "$(DATA)" || { echo "make openacc needs a recording: make openacc DATA=FILE.csv" >&2; exit 2; }
+	@$(PY) tests/openacc/openacc.py $(DATA)
+
+.PHONY: openacc-generated
+openacc-generated: lib
+	@$(PY) tests/openacc/openacc.py --generated --misses $(BUILD)/openacc-generated-misses.txt
+
+.PHONY: pytest
+pytest: lib apps with-vcan $(BUILD)/oracle/oracle_run ## tests of the host tools, and of the node on vcan
+	@$(PY) -m pytest -q -p no:cacheprovider tests/host tests/node
+
+TEST_PARTS += apps pytest openacc-generated lint coverage
