@@ -60,7 +60,12 @@ def _expect(parser: argparse.ArgumentParser) -> None:
 
 
 def _drive(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--bus", default="auto", metavar="BUS", help="auto (default): an existing vcan, else one that is made for the run, else none; inprocess: none; or the name of a SocketCAN interface")
+    parser.add_argument(
+        "--bus",
+        default="auto",
+        metavar="BUS",
+        help="auto (default): an existing vcan, else one made for the run, else none; inprocess: none; or a SocketCAN interface",
+    )
     parser.add_argument("--speed", default="max", metavar="X", help="max (default): in lockstep, as fast as the node answers; or a multiple of real time")
     parser.add_argument("--out", metavar="DIR", help="write run.log, run.json, signals.csv, labels.csv, the DBC and report.html there")
     _expect(parser)

@@ -117,7 +117,7 @@ def _by_fault(made: Design, faults: Sequence[int], values: Any) -> dict[str, flo
 
 
 def run_design(args: argparse.Namespace) -> int:
-    """hullguard design."""
+    """Hullguard design."""
     from hullguard.codegen import write_all
     from hullguard.report.design_report import write_design_report
 
@@ -169,7 +169,7 @@ def the_faults(args: argparse.Namespace, model: Model, scenario: Sequence[FaultS
 
 
 def run_run(args: argparse.Namespace) -> int:
-    """hullguard run."""
+    """Hullguard run."""
     if args.seed < 0:
         raise InputError(f"--seed {args.seed}: expected 0 or more")
     model, made = prepared(args)
@@ -182,7 +182,7 @@ def run_run(args: argparse.Namespace) -> int:
 
 
 def run_replay(args: argparse.Namespace) -> int:
-    """hullguard replay."""
+    """Hullguard replay."""
     model, made = prepared(args)
     series = read_recording(Path(args.csv), model)
     samples = min(args.samples or len(series), len(series))
@@ -370,7 +370,7 @@ def _expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
 
 
 def run_plant(args: argparse.Namespace) -> int:
-    """hullguard plant: the emulator alone."""
+    """Hullguard plant: the emulator alone."""
     model, made = prepared(args)
     scenario = model.scenario(args.scenario)
     samples = args.samples or scenario.samples
@@ -391,7 +391,7 @@ def run_plant(args: argparse.Namespace) -> int:
 
 
 def run_detect(args: argparse.Namespace) -> int:
-    """hullguard detect."""
+    """Hullguard detect."""
     _, made = prepared(args)
     native = Native(library(args.real), made.tables)
     stopped: list[int] = []
@@ -438,7 +438,7 @@ def run_detect(args: argparse.Namespace) -> int:
 
 
 def run_campaign(args: argparse.Namespace) -> int:
-    """hullguard campaign."""
+    """Hullguard campaign."""
     if not 0.0 <= args.loss < 1.0:
         raise InputError(f"--loss {args.loss:g}: expected a probability from 0 to below 1")
     if args.runs < 1:
@@ -482,10 +482,9 @@ def run_campaign(args: argparse.Namespace) -> int:
 
 
 def run_report(args: argparse.Namespace) -> int:
-    """hullguard report."""
+    """Hullguard report."""
     directory = Path(args.directory)
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give the --out folder of a run")
     _report(args, directory)
     return 0
-

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import REALS, SILENT_1, Alarms, Models, Ready, alarms
+from host_support import REALS, SILENT_1, Alarms, Models, Ready, alarms
 
 RUNS = 1000
 SAMPLES = 200

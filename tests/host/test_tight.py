@@ -4,19 +4,30 @@ plant can make it, by sign and by linear programme, from the plant's own matrice
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hullguard.core.library import Library, library
+from hullguard.design import hull
 from scipy.optimize import linprog
-from support import PERIODIC, REALS, SEED, SILENT_1, SILENT_2, Alarms, Models, Ready, alarms, build_library
+from host_support import PERIODIC, REALS, SEED, SILENT_1, SILENT_2, Alarms, Models, Ready, alarms, build_library
 
 OUTPUTS, INPUTS = 3, 3
 # Quantisation is no disturbance that a test can choose; ten times finer codes make it small.
 FINE: dict[str, Any] = {f"signals.{i}.resolution": 1e-4 for i in range(OUTPUTS)} | {f"signals.{i}.range": [-2.0, 2.0] for i in range(OUTPUTS)}
 LENGTH = 160
+NO_TAIL = 1e-7  # of the threshold: so many taps that nothing is left to the bound on what lies behind them
+
+
+@pytest.fixture(scope="module")
+def exact() -> Iterator[Models]:
+    """Designs whose thresholds are the exact hull but for rounding."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hull, "TAIL_SHARE", NO_TAIL)
+        yield Models()
 
 
 def worst_case(ready: Ready, residual: int, k: int) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
@@ -57,8 +68,8 @@ def residuals(ready: Ready) -> range:
 
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("k", [0, 3, 20, 60, 150])
-def test_no_periodic_residual_stays_below_its_threshold_by_more_than_2_percent_or_exceeds_it(models: Models, real: str, k: int) -> None:
-    ready = models.platoon("manoeuvres", PERIODIC | FINE, real)
+def test_no_periodic_residual_stays_below_its_threshold_by_more_than_2_percent_or_exceeds_it(exact: Models, real: str, k: int) -> None:
+    ready = exact.platoon("manoeuvres", PERIODIC | FINE, real)
     for i in residuals(ready):
         for sign in (1.0, -1.0):
             assert 0.98 <= ratio_at(ready, i, k, sign) <= 1.0, f"residual {i + 1} at sample {k}, sign {sign:g}"
@@ -66,11 +77,18 @@ def test_no_periodic_residual_stays_below_its_threshold_by_more_than_2_percent_o
 
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("k", [20, 60, 150])
-def test_no_periodic_residual_as_shipped_exceeds_its_threshold(models: Models, real: str, k: int) -> None:
-    """Codes of 1 mm: their rounding is 2 to 3 % of the threshold and falls as it may."""
+def test_no_periodic_residual_as_designed_exceeds_its_threshold(models: Models, real: str, k: int) -> None:
+    """Codes of 1 mm, whose rounding is 2 to 3 % of the threshold and falls as it may, and few taps: near the threshold, never above it."""
     ready = models.platoon("manoeuvres", PERIODIC, real)
     for i in residuals(ready):
-        assert 0.94 <= ratio_at(ready, i, k, runs=200) <= 1.0
+        assert 0.85 <= ratio_at(ready, i, k, runs=200) <= 1.0
+
+
+def test_the_bound_on_what_lies_behind_the_taps_does_not_cost_2_percent_of_a_threshold(models: Models) -> None:
+    for generator in models.design().generators:
+        tables = generator.tables
+        behind = tables.tail_output * (tables.tail_input * generator.radius).sum() / (1 - tables.decay)
+        assert np.all(behind <= 0.02 * tables.steady)
 
 
 # ---- events: held values, true outputs, disturbances and initial state by linear programme ----
@@ -180,8 +198,8 @@ def lossy_alarms(models: Models, lib: Library) -> Alarms:
     return alarms(models.platoon("manoeuvres", lib=lib).batch(200, loss=0.1).runs(0, 1000))
 
 
-def tightest(models: Models, lib: Library) -> float:
-    ready = models.platoon("manoeuvres", PERIODIC | FINE, lib=lib)
+def tightest(exact: Models, lib: Library) -> float:
+    ready = exact.platoon("manoeuvres", PERIODIC | FINE, lib=lib)
     return max(ratio_at(ready, i, k) for i in residuals(ready) for k in (20, 150))
 
 
@@ -209,17 +227,17 @@ def test_a_detector_that_withdraws_alarms_but_keeps_the_small_radii_of_a_gap_is_
     assert max(after_gaps(models, build_library(tmp_path, "f32", NO_REWRITING))) > 1.0
 
 
-def test_thresholds_that_are_7_percent_too_small_are_caught(models: Models, tmp_path: Path) -> None:
-    assert tightest(models, library("f32")) <= 1.0
+def test_thresholds_that_are_7_percent_too_small_are_caught(models: Models, exact: Models, tmp_path: Path) -> None:
+    assert tightest(exact, library("f32")) <= 1.0
     assert worst_held(models, library("f32")) <= 1.0
     mutant = build_library(tmp_path, "f32", SMALL_J)
-    assert tightest(models, mutant) > 1.0
+    assert tightest(exact, mutant) > 1.0
     assert worst_held(models, mutant) > 1.0
 
 
-def test_a_rebuilt_library_without_a_mutation_passes_the_same_checks(models: Models, tmp_path: Path) -> None:
+def test_a_rebuilt_library_without_a_mutation_passes_the_same_checks(models: Models, exact: Models, tmp_path: Path) -> None:
     """So that it is the mutation, not the rebuilding, that the three tests above see."""
     same = build_library(tmp_path, "f32")
     assert silent_alarms(models, same) == silent_alarms(models, library("f32"))
     assert lossy_alarms(models, same) == lossy_alarms(models, library("f32"))
-    assert tightest(models, same) == tightest(models, library("f32"))
+    assert tightest(exact, same) == tightest(exact, library("f32"))

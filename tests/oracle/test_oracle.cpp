@@ -545,10 +545,10 @@ std::string one_hull(Random &random, HullCount &count)
             y.push_back(in.head(m));
             u.push_back(in.tail(width - m));
         }
-        double behind = 0.0; /* largest weighted radius that has just left the taps */
+        double behind = 0.0; /* weighted radii that have just left the taps */
         if (k >= taps) {
             for (Eigen::Index i = 0; i < width; ++i) {
-                behind = std::max(behind, tail.input(i) * static_cast<double>(radii[static_cast<size_t>(k - taps)][places[static_cast<size_t>(i)]]));
+                behind += tail.input(i) * static_cast<double>(radii[static_cast<size_t>(k - taps)][places[static_cast<size_t>(i)]]);
             }
         }
         theta = tail.decay * theta + behind;

@@ -78,4 +78,6 @@ def _entry(raw: str, where: str) -> Entry:
         return Entry(float(found["time"]), found["channel"], Frame(number, flags | REMOTE, b""))
     if len(rest) % 2 or "R" in rest or "#" in rest:
         raise InputError(f"{where}: data '{rest[:40]}' is not whole bytes")
+    if len(rest) > 2 * (64 if flags & FD else 8):
+        raise InputError(f"{where}: {len(rest) // 2} bytes of data, more than a frame of this kind has")
     return Entry(float(found["time"]), found["channel"], Frame(number, flags, bytes.fromhex(rest)))

@@ -387,9 +387,9 @@ class Recording:
 
 
 RESULT = (
-    "measurement closing verdicts lost bits measurement_bits provisional_at confirmed_at false_provisional false_confirmed interval_min interval_max "
-    "margin margin_after candidates plant"
-).split()
+    *("measurement", "closing", "verdicts", "lost", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
+    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_after", "candidates", "plant"),
+)
 
 
 class Batch:

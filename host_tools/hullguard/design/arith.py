@@ -13,7 +13,7 @@ U32 = 2.0**-24  # unit roundoff of float32
 
 
 def mul(a: Array, b: Array) -> Array:
-    """a b, summed in index order."""
+    """A b, summed in index order."""
     out = np.zeros((a.shape[0], b.shape[1]))
     for i in range(a.shape[1]):
         out += a[:, i, None] * b[None, i, :]

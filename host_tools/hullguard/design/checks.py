@@ -68,7 +68,8 @@ def generator_checks(i: int, plant: SubPlant, o: ObserverMatrices, f: PostFilter
     if not filtered:
         return checks
     residual, asymmetry, stable = riccati(o, f)
-    return checks + [
+    return [
+        *checks,
         Check(name + "DARE residual", residual, 1e-8, "choose another order, poles or more disturbance"),
         Check(name + "DARE asymmetry", asymmetry, 1e-8, "choose another order, poles or more disturbance"),
         Check(name + "largest pole of the stabilising solution", stable, 1 - 1e-9, "choose another order, poles or more disturbance"),

@@ -11,7 +11,6 @@ from hullguard.bus.bits import load_bound
 from hullguard.design import hull, store
 from hullguard.design.arith import digits
 from hullguard.design.checks import Check, generator_checks, refuse
-from hullguard.design.ids import fold
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
 from hullguard.design.reach import reach
 from hullguard.design.search import FaultPath, between_events, search, smallest_faults
@@ -173,7 +172,7 @@ def refilter(model: Model, old: Stored) -> Stored:
 
 
 def _fits(model: Model, old: Stored) -> bool:
-    """Can the stored parity vectors serve this model: same plant, same shapes?"""
+    """Whether the stored parity vectors can serve this model: same plant, same shapes."""
     same_plant = old.A.shape == model.plant.A.shape and np.allclose(old.A, model.plant.A, 0, 1e-12) and np.allclose(old.B, model.plant.B, 0, 1e-12)
     shapes = len(old.observers) == len(model.observers) and all(
         o.v.shape == (s.order + 1, len(s.outputs)) and o.W.shape[0] <= s.residuals for o, s in zip(old.observers, model.observers, strict=False)
@@ -297,7 +296,14 @@ def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, ge
         if np.isfinite(stored.signal_reach[i]):
             offset = abs(float(model.plant.C[model.outputs.index(i)] @ model.plant.equilibrium)) if i in model.outputs else 0.0
             limit = min(-s.low, s.high) if s.low < 0 < s.high else max(abs(s.low), abs(s.high))
-            checks.append(Check(f"reach of {s.name}", float(stored.signal_reach[i]) + offset, limit, f"widen its range to at least {stored.signal_reach[i] + offset:.3g}, or bound the reference more tightly"))
+            checks.append(
+                Check(
+                    f"reach of {s.name}",
+                    float(stored.signal_reach[i]) + offset,
+                    limit,
+                    f"widen its range to at least {stored.signal_reach[i] + offset:.3g}, or bound the reference more tightly",
+                )
+            )
     checks.append(Check("bus load, worst case", bound, model.load_max, "raise bitrate_bps, the trigger's silence or the sample time"))
     for i, g in enumerate(generators):
         share = float((g.tables.rounding / g.tables.steady).max())

@@ -26,11 +26,12 @@ class Reach:
 def _closed_loop(model: Model) -> tuple[Array, Array, Array, Array, Array] | None:
     """A, input matrix and output maps of the emulated loop: w = (reference, quantisation of u, d) |w| <= 1, s = all signals."""
     plant = model.plant
-    if plant.feedback is None:
+    if plant.feedback is None and plant.p > 0:
         return None
-    K = plant.feedback.gain
+    # A plant without inputs is its own loop.
+    K, bound = (plant.feedback.gain, plant.feedback.reference_bound) if plant.feedback is not None else (np.zeros((0, plant.n)), np.zeros(0))
     half = np.array([model.signals[i].resolution / 2 for i in model.inputs])
-    drive = np.hstack([np.diag(plant.feedback.reference_bound), np.diag(half)])
+    drive = np.hstack([np.diag(bound), np.diag(half)])
     nd = plant.Ed.shape[1]
     A = plant.A - plant.B @ K
     Bw = np.hstack([plant.B @ drive, plant.Ed])
@@ -50,7 +51,7 @@ def _declared_slew(signal: Signal, horizon: int) -> Array:
     while len(known) < horizon:
         j = len(known) + 1
         known.append(min(known[a - 1] + known[j - a - 1] for a in range(1, j)))
-    return np.minimum(np.array(known[:horizon]), signal.high - signal.low)
+    return np.asarray(np.minimum(np.array(known[:horizon]), signal.high - signal.low), dtype=np.float64)
 
 
 def reach(model: Model, horizon: int) -> Reach:
@@ -71,9 +72,7 @@ def reach(model: Model, horizon: int) -> Reach:
     else:
         for i in wanted:
             if model.signals[i].role == "output":
-                raise InputError(
-                    f"signal '{model.signals[i].name}': slew = \"reachable\" needs [plant] feedback with a stable loop; declare the slew as a list"
-                )
+                raise InputError(f"signal '{model.signals[i].name}': slew = \"reachable\" needs [plant] feedback with a stable loop; declare the slew as a list")
     for i, s in enumerate(model.signals):
         if s.slew is not None:
             slew[i] = _declared_slew(s, horizon)

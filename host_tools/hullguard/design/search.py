@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from hullguard.design.arith import digits
 from scipy.optimize import linprog
 
+from hullguard.design.arith import digits
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, best_rows, fused, gamma_of, no_filter, output_map, post_filter, structure
 from hullguard.errors import InputError
 from hullguard.model.schema import Search
@@ -86,13 +85,13 @@ def between_events(plant: SubPlant, order: int, paths: list[FaultPath], quantum:
     m, s = plant.C.shape[0], order
     n, nd, p = plant.A.shape[0], plant.Ed.shape[1], plant.B.shape[1]
     O, Md, Mu = np.zeros((s + 1, m, n)), np.zeros((s + 1, m, s + 1, nd)), np.zeros((s + 1, m, s + 1, p))
-    power = np.eye(n)
+    into_d, into_u, power = plant.Fd, plant.D, np.eye(n)
     for lag in range(s + 1):
         O[lag] = plant.C @ power
         for k in range(s + 1 - lag):
-            Md[k + lag, :, k] = plant.Fd if lag == 0 else plant.C @ before @ plant.Ed
-            Mu[k + lag, :, k] = plant.D if lag == 0 else plant.C @ before @ plant.B
-        before, power = power, plant.A @ power
+            Md[k + lag, :, k] = into_d
+            Mu[k + lag, :, k] = into_u
+        into_d, into_u, power = plant.C @ power @ plant.Ed, plant.C @ power @ plant.B, plant.A @ power
     radius = np.tile(np.concatenate([plant.Sy, plant.Su]), (s + 1, 1))
     for end in (0, s):
         radius[end, spoken] = quantum[spoken]
@@ -135,9 +134,7 @@ def _draw(rng: np.random.Generator, plant: SubPlant, basis: Array, order: int, p
     return v, rng.uniform(*poles, order)
 
 
-def search(
-    plant: SubPlant, basis: Array, order: int, residuals: int, paths: list[FaultPath], radius: Array, aware: bool, setting: Search, tick: Callable[[], None]
-) -> Candidate:
+def search(plant: SubPlant, basis: Array, order: int, residuals: int, paths: list[FaultPath], radius: Array, aware: bool, setting: Search, tick: Callable[[], None]) -> Candidate:
     """Random trials for two thirds of the budget, then steps around the best; the same seed gives the same result on one machine."""
     rng = np.random.default_rng(setting.seed)
     best: Candidate | None = None

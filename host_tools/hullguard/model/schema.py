@@ -268,7 +268,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     outputs = [s.name for s in signals if s.role == "output"]
     inputs = [s.name for s in signals if s.role == "input"]
     if not outputs:
-        raise InputError(f"{path.name}: no signal has role = \"output\": there is nothing to check")
+        raise InputError(f'{path.name}: no signal has role = "output": there is nothing to check')
     noise = {s.name: s.noise for s in signals}
     plant = read_plant(top.table("plant"), outputs, inputs, noise, sample_time_s)
     faults = tuple(_read_fault(t, signals) for t in top.tables("faults", optional=True))
@@ -280,7 +280,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     scenarios = _read_scenarios(top, path)
     top.close()
     if sum(g.closing for g in groups) != 1:
-        raise InputError(f"{path.name}: exactly one group closes the sample with transmission = \"tick\"; found {sum(g.closing for g in groups)}")
+        raise InputError(f'{path.name}: exactly one group closes the sample with transmission = "tick"; found {sum(g.closing for g in groups)}')
     return Model(
         name=name,
         path=path,
@@ -333,7 +333,7 @@ def _read_signal(t: Table) -> Signal:
     slew: tuple[float, ...] | None = None
     if "slew" in t and t.raw("slew") != "reachable":
         if isinstance(t.raw("slew"), str):
-            raise t.error("slew", "expected a list of numbers or \"reachable\"")
+            raise t.error("slew", 'expected a list of numbers or "reachable"')
         slew = tuple(float(v) for v in t.vector("slew", low=0.0))
         if not slew or any(b < a for a, b in zip(slew, slew[1:], strict=False)):
             raise t.error("slew", "expected at least one number, none smaller than the one before")
@@ -384,8 +384,7 @@ def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[
     for g in groups:
         if closing and not g.closing and g.frame.id > closing[0].frame.id:
             raise InputError(
-                f"{path.name}: group '{g.name}' (0x{g.frame.id:X}) would arrive after the closing frame (0x{closing[0].frame.id:X}): "
-                "give the closing frame the larger identifier"
+                f"{path.name}: group '{g.name}' (0x{g.frame.id:X}) would arrive after the closing frame (0x{closing[0].frame.id:X}): give the closing frame the larger identifier"
             )
     return tuple(groups), order
 

@@ -1,5 +1,6 @@
 """Strict reading of TOML tables: unknown keys, wrong types, wrong shapes and numbers that are not finite are refused, and the
-message says where, what was found and what would do."""
+message says where, what was found and what would do.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +54,7 @@ class Table:
         return value
 
     def flag(self, key: str, default: bool) -> bool:
-        """true or false."""
+        """True or false."""
         if key not in self:
             return default
         value = self.raw(key)

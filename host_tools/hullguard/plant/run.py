@@ -194,9 +194,7 @@ class Run:
 def periodic_bits(design: Design, native: Native, readings: Sequence[Sequence[float]]) -> tuple[int, int, int]:
     """Frames, bits, and bits of the measurement groups alone, if every group sent every sample through the same codec."""
     tables = native.tables
-    groups = tuple(
-        replace(g, levels=1, interval_max=1, silence=(0,), delta=g.delta[:1], sigma=g.sigma[:1], activity=g.activity[:1]) for g in tables.groups
-    )
+    groups = tuple(replace(g, levels=1, interval_max=1, silence=(0,), delta=g.delta[:1], sigma=g.sigma[:1], activity=g.activity[:1]) for g in tables.groups)
     every = Native(native.library, replace(tables, groups=groups))
     sender = Sender(every)
     frames = bits = measured = 0

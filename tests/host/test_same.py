@@ -1,0 +1,159 @@
+"""One seed, one run: whoever makes it, sample by sample or in C, from structures filled at run time or from generated tables, with one worker or two."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hullguard.campaign.campaign import Job, campaign
+from hullguard.codegen import emit_c
+from hullguard.core.library import Library
+from hullguard.core.native import PLANT_STATES, REST, Frame, Native, Node, Plant, Sender, bus_of
+from hullguard.model import parse_fault
+from hullguard.plant.run import InProcess, Pace, Run, Trace
+from host_support import REALS, SEED, SILENT_1, Cli, Models, Ready, build_library
+
+FAULTS = ("controller2:bias:1.0@60", "gap12_m:freeze@100..120", "speed1_mps:noise:0.1@130", "controller1:gain:0.5@20..40", "gap23_m:drift:0.2@140")
+
+
+def sample_by_sample(ready: Ready, samples: int, faults: tuple[str, ...], seed: int, pace: Pace) -> Trace:
+    source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in faults], seed)
+    return Run(ready.design, ready.native, InProcess(), pace).samples(source, samples)
+
+
+@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("scenario", ["rest", "manoeuvres", "adaptive", "default"])
+@pytest.mark.parametrize("faults", [(), FAULTS], ids=["healthy", "faulty"])
+def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(models: Models, real: str, scenario: str, faults: tuple[str, ...]) -> None:
+    ready = models.platoon(scenario, None, real)
+    for seed, lockstep in ((SEED, False), (SEED + 1, True)):
+        slow, fast = sample_by_sample(ready, 160, faults, seed, Pace(lockstep, 1e9)), ready.batch(160, faults, seed).trace(0)
+        for name in ("reading", "value", "radius", "r", "J"):
+            assert np.array_equal(np.array(getattr(slow, name)), fast[name]), name
+        assert [PLANT_STATES.index(v.plant) for v in slow.verdict] == fast["plant"].tolist()
+        assert [v.bus for v in slow.verdict] == [bus_of(int(b), 2) for b in fast["bus"]]
+        assert [sum(1 << g for g in e) for e in slow.events] == fast["events"].tolist()
+        if not lockstep:  # replies move the counter of the verdict frames, and with it their stuff bits
+            assert slow.bits == fast["bits"].tolist()
+
+
+def test_another_seed_gives_another_run(models: Models) -> None:
+    ready = models.platoon("manoeuvres")
+    assert not np.array_equal(ready.batch(50, (), SEED).trace(0)["reading"], ready.batch(50, (), SEED + 1).trace(0)["reading"])
+
+
+@pytest.mark.parametrize("real", REALS)
+def test_batches_and_traces_of_one_run_agree(models: Models, real: str) -> None:
+    ready = models.platoon("manoeuvres", SILENT_1, real)
+    batch = ready.batch(150, ("controller2:bias:1.5@60",))
+    for run, row in enumerate(batch.runs(0, 5)):
+        trace = batch.trace(run)
+        alarm = np.flatnonzero(trace["plant"][60:] >= PLANT_STATES.index("provisional")) + 60
+        assert row["provisional_at"] == (alarm[0] if len(alarm) else -1)
+        assert row["measurement"] == int((trace["events"] & 1).sum())
+        assert row["margin"] == pytest.approx(float((np.abs(trace["r"]) / trace["J"])[:60].max()), rel=1e-12)
+        assert row["bits"] == trace["bits"].sum()
+
+
+# ---- generated tables ----
+
+ACCESS = """
+#include "platoon.h"
+const hg_node_config   *test_config(void);
+const hg_sender_config *test_senders(void);
+const hg_node_config   *test_config(void) { return &hg_platoon_config; }
+const hg_sender_config *test_senders(void) { return hg_platoon_sender; }
+"""
+
+
+@pytest.fixture(scope="module", params=REALS)
+def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, models: Models) -> tuple[Ready, Library]:
+    """The platoon's generated C compiled into a library of its own, beside the structures that Python fills."""
+    folder: Path = tmp_path_factory.mktemp(f"generated_{request.param}")
+    ready = models.platoon("manoeuvres", None, request.param)
+    header, source = emit_c(ready.design)
+    (folder / "include").mkdir()
+    (folder / "include" / "platoon.h").write_text(header, encoding="ascii")
+    lib = build_library(folder / "lib", request.param, extra=source + ACCESS, includes=("-I", str(folder / "include")))
+    lib.ffi.cdef("const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);")
+    return ready, lib
+
+
+def generated_node(ready: Ready, lib: Library, start: int) -> Node:
+    native: Any = SimpleNamespace(library=lib, node=lib.lib.test_config(), tables=ready.native.tables)
+    return Node(native, start)
+
+
+def generated_senders(ready: Ready, lib: Library) -> Sender:
+    native: Any = SimpleNamespace(library=lib, senders=lib.lib.test_senders(), tables=ready.native.tables)
+    return Sender(native)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(generated: tuple[Ready, Library], lockstep: bool, loss: float) -> None:
+    ready, lib = generated
+    rng = np.random.default_rng(SEED)
+    for start in (REST, 0):
+        source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in FAULTS], SEED)
+        nodes = (Node(ready.native, start), generated_node(ready, lib, start))
+        senders = (Sender(ready.native), generated_senders(ready, lib))
+        answers = 0
+        for k in range(200):
+            reading = source.read()
+            for g in range(2):
+                frames = [s.step(g, k, reading) for s in senders]
+                assert frames[0] == frames[1]
+                frame = frames[0]
+                if frame is None or (g == 0 and rng.random() < loss):
+                    continue
+                if rng.random() < loss / 4:
+                    damaged = bytearray(frame.data)
+                    damaged[int(rng.integers(8))] ^= 1 << int(rng.integers(8))
+                    if g == 0:
+                        frame = Frame(frame.id, frame.flags, bytes(damaged))
+                assert nodes[0].receive(frame) == nodes[1].receive(frame)
+            verdicts = [n.step() for n in nodes]
+            assert verdicts[0] == verdicts[1]
+            reports = [n.report(lockstep) for n in nodes]
+            assert reports[0] == reports[1], f"sample {k}"
+            answers += len(reports[0])
+            assert nodes[0].r == nodes[1].r
+            assert nodes[0].J == nodes[1].J
+            source.move()
+        assert answers > 20
+        assert nodes[0].health() == nodes[1].health()
+
+
+def test_the_committed_tables_are_those_of_the_design(models: Models) -> None:
+    header, source = emit_c(models.design())
+    folder = Path(__file__).resolve().parents[2] / "firmware" / "models"
+    assert (folder / "platoon.h").read_text(encoding="ascii") == header, "run: make models"
+    assert (folder / "platoon.c").read_text(encoding="ascii") == source, "run: make models"
+
+
+# ---- campaigns ----
+
+
+def test_a_campaign_does_not_depend_on_the_number_of_workers(models: Models) -> None:
+    made = models.design(None, "manoeuvres")
+    reference = made.model.scenario("manoeuvres").reference
+    job = Job(made.model, made.stored, "f32", 100, reference, (parse_fault("controller2:bias:1.0@40"),), SEED, 0.05, REST)
+    assert campaign(job, 120, 1, lambda n: None) == campaign(job, 120, 2, lambda n: None)
+
+
+def test_a_campaign_is_the_batch_it_says_it_is(models: Models, cli: Cli) -> None:
+    rows = cli("campaign", "platoon", "--scenario", "manoeuvres", "--runs", 7, "--workers", 1, "--seed", 5, "--samples", 90, "--json", "-q").json["rows"]
+    assert rows == models.platoon("manoeuvres").batch(90, seed=5).runs(0, 7)
+
+
+def test_native_structures_do_not_change_while_runs_use_them(models: Models) -> None:
+    ready = models.platoon("manoeuvres")
+    before = ready.batch(60).trace(0)
+    other = Native(ready.native.library, models.design(SILENT_1, "manoeuvres").tables)
+    after = ready.batch(60).trace(0)
+    assert other.node.model_hash != ready.native.node.model_hash
+    assert all(np.array_equal(before[name], after[name]) for name in before)
