@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import itertools
 import json
 import re
 import tomllib
@@ -335,7 +336,7 @@ def _read_signal(t: Table) -> Signal:
         if isinstance(t.raw("slew"), str):
             raise t.error("slew", 'expected a list of numbers or "reachable"')
         slew = tuple(float(v) for v in t.vector("slew", low=0.0))
-        if not slew or any(b < a for a, b in zip(slew, slew[1:], strict=False)):
+        if not slew or any(b < a for a, b in itertools.pairwise(slew)):
             raise t.error("slew", "expected at least one number, none smaller than the one before")
     recording = t.table("recording", optional=True)
     delay = recording.whole("delay", 0, 100, 0)

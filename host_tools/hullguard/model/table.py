@@ -1,5 +1,6 @@
-"""Strict reading of TOML tables: unknown keys, wrong types, wrong shapes and numbers that are not finite are refused, and the
-message says where, what was found and what would do.
+"""Strict reading of TOML tables.
+
+Unknown keys, wrong types, wrong shapes and numbers that are not finite are refused, and the message says where, what was found and what would do.
 """
 
 from __future__ import annotations
