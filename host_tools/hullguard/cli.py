@@ -137,6 +137,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     p = add("report", "draw report.html from the files of a run")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run")
+    p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
     _output(p)
     return parser
 

@@ -487,4 +487,8 @@ def run_report(args: argparse.Namespace) -> int:
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give the --out folder of a run")
     _report(args, directory)
+    if args.png:
+        from hullguard.report.run_report import write_picture
+
+        say(args, f"picture: {write_picture(directory, Path(args.png))}")
     return 0

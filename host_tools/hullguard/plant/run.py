@@ -159,8 +159,8 @@ class Run:
         """Frames of the node: logged, counted, and in lockstep compared. The bits of those that a free-running node would send too."""
         bits = 0
         got = self.bus.answer(k, expected, time_s)
-        for frame, stamp in got:
-            self._write(frame, stamp)
+        for frame, _ in got:
+            self._write(frame, time_s)  # a log has one clock, the run's
             told = read_verdict(self.native, frame)
             length = frame_bits(self.native.library, frame)
             if told is not None and told.reply:

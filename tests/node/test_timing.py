@@ -1,0 +1,123 @@
+"""detector_node in real time at T = 10 ms for 60 s: every missed deadline has a cause outside the node, and no frame is lost.
+
+Guest and host schedule as they please, so absolute jitter says nothing. A reference process in the same guest sees the same gaps: a missed
+deadline is explained when it lies within one period of a gap that the reference saw.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from conftest import TICKS
+
+PERIOD_US = 10_000
+
+
+@dataclass(frozen=True)
+class Span:
+    """From one moment to another, microseconds."""
+
+    start: int
+    end: int
+
+
+def unexplained(misses: list[Span], gaps: list[Span], period_us: int = PERIOD_US) -> list[Span]:
+    """Missed deadlines (due, noticed) that lie further than one period from every gap."""
+    return [m for m in misses if not any(g.start - period_us <= m.start <= g.end + period_us for g in gaps)]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """One run's files."""
+
+    misses: list[Span]  # while ticks were sent
+    all_misses: int
+    steps: int
+    gaps: list[Span]
+    watch: dict[str, int]
+    send: dict[str, int]
+    status: str  # last line
+    plants: set[str]
+
+    def health(self, group: str) -> tuple[int, int, int]:
+        """Frames good, lost, refused."""
+        found = re.search(rf" {group}=\w+/good:(\d+)/lost:(\d+)/refused:(\d+)", self.status)
+        assert found, self.status
+        return int(found[1]), int(found[2]), int(found[3])
+
+    def counter(self, name: str) -> str:
+        """A number or word of the status line."""
+        found = re.search(rf"\b{name}=(\w+)", self.status)
+        assert found, self.status
+        return found[1]
+
+
+def numbers(text: str) -> dict[str, int]:
+    return {words[0]: int(words[1]) for line in text.splitlines() if len(words := line.split()) == 2}
+
+
+def read(folder: Path, name: str) -> Seen:
+    watch = (folder / f"{name}.watch").read_text()
+    gaps = [Span(int(w[2]), int(w[3])) for line in watch.splitlines() if (w := line.split())[0] == "gap"]
+    told = numbers(watch)
+    missed = (folder / f"{name}.missed").read_text().splitlines()
+    head = re.fullmatch(r"# samples (\d+) missed (\d+)", missed[0])
+    assert head, missed[0]
+    every = [Span(int(w[1]), int(w[2])) for line in missed[2:] if (w := line.split())]
+    assert len(every) == int(head[2])
+    lines = (folder / f"{name}.node").read_text().splitlines()
+    assert lines[0] == "ready"
+    plants = {m[1] for line in lines[1:] if (m := re.search(r"plant=(\w+)", line))}
+    # After the last tick every deadline is missed, and rightly so: the node is stopped a little later.
+    while_sent = [m for m in every if m.start <= told["last_us"]]
+    return Seen(while_sent, len(every), int(head[1]), gaps, told, numbers((folder / f"{name}.send").read_text()), lines[-1], plants)
+
+
+def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(timing_files: Path) -> None:
+    seen = read(timing_files, "steady")
+    print(f"{len(seen.misses)} deadlines missed, {len(seen.gaps)} gaps; longest {seen.watch['longest_tick_us']} us between ticks, {seen.watch['longest_wake_us']} us between wake-ups")
+    assert seen.watch["last_us"] - seen.watch["first_us"] >= 59.9e6
+    assert seen.watch["wakes"] > 0.5 * 6000, "the reference's own timer must have run"
+    assert not unexplained(seen.misses, seen.gaps)
+
+
+def test_no_frame_is_lost(timing_files: Path) -> None:
+    seen = read(timing_files, "steady")
+    assert seen.send["ticks"] == seen.send["control"] == seen.watch["ticks"] == TICKS["steady"][0]
+    assert (seen.counter("dropped"), seen.counter("malformed"), seen.counter("unsent"), seen.counter("errors"), seen.counter("can")) == ("0", "0", "0", "0", "active")
+    assert seen.watch["lost"] == 0
+    for group in ("measurement", "control"):
+        good, lost, refused = seen.health(group)
+        assert lost == 0, f"{group}: by its sequence counter"
+        assert good + refused == seen.send[group], f"{group}: {good} booked and {refused} late of {seen.send[group]}"
+        assert refused == 0 or seen.misses, f"{group}: {refused} frames refused though every tick came in time"
+    assert seen.steps == seen.health("control")[0] + seen.all_misses, "a step has a closing frame or a missed deadline"
+
+
+def test_a_healthy_plant_stays_healthy(timing_files: Path) -> None:
+    for name in TICKS:
+        assert read(timing_files, name).plants <= {"starting", "none"}
+
+
+def test_a_dropped_tick_is_an_unexplained_miss(timing_files: Path) -> None:
+    """The same judge, the same files: it does not excuse what no gap explains."""
+    seen = read(timing_files, "dropped")
+    ticks, every = TICKS["dropped"]
+    dropped = ticks // every
+    assert seen.send["dropped"] == dropped and seen.send["control"] == ticks - dropped
+    assert len(seen.misses) >= dropped - 1  # the last tick of all is one that is dropped
+    found = unexplained(seen.misses, seen.gaps)
+    assert found, "none of the dropped ticks was noticed as a miss without a gap"
+    assert len(found) <= dropped
+    assert seen.health("control")[1] == dropped - 1
+
+
+def test_the_judge() -> None:
+    gap = Span(1_000_000, 1_016_000)
+    inside, edge, before, after = Span(1_015_000, 1_016_000), Span(1_026_000, 1_026_500), Span(989_999, 990_100), Span(1_026_001, 1_026_100)
+    assert unexplained([inside, edge], [gap]) == []
+    assert unexplained([inside, before, edge, after], [gap]) == [before, after]
+    assert unexplained([inside], []) == [inside]
+    assert unexplained([], [gap]) == []
