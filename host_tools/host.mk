@@ -7,7 +7,7 @@ SHIPPED   := $(filter-out %.design,$(patsubst host_tools/models/%.toml,%,$(wildc
 demo: ## set up, then run the platoon with a controller fault on the best bus at hand; report in build/demo/
 	@host_tools/setup.sh demo
 	@$(MAKE) lib apps with-vcan
-	@$(HULLGUARD) run platoon --expect detect --out $(BUILD)/demo
+	@$(HULLGUARD) run platoon --speed 10 --expect detect --out $(BUILD)/demo
 	@echo "look at $(BUILD)/demo/report.html"
 
 .PHONY: models

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from hullguard import __version__
 from hullguard.errors import HullguardError
@@ -14,6 +15,14 @@ EPILOG = """a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:b
 
 exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened
 """
+
+
+class _Parser(argparse.ArgumentParser):
+    """Errors are one line, like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        """Status 2."""
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
 def _common(parser: argparse.ArgumentParser) -> None:
@@ -39,13 +48,20 @@ def _scenario(parser: argparse.ArgumentParser) -> None:
 
 def _length(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", type=_positive, metavar="N", help="number of samples")
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="seed of every random number (default 1)")
+    parser.add_argument("--seed", type=_seed, default=1, metavar="S", help="seed of every random number (default 1)")
 
 
 def _positive(text: str) -> int:
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is not at least 1")
+    return value
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value < 2**64:
+        raise argparse.ArgumentTypeError(f"{value} is not within 0 .. 2^64 - 1")
     return value
 
 
@@ -66,7 +82,7 @@ def _drive(parser: argparse.ArgumentParser) -> None:
         metavar="BUS",
         help="auto (default): an existing vcan, else one made for the run, else none; inprocess: none; or a SocketCAN interface",
     )
-    parser.add_argument("--speed", default="max", metavar="X", help="max (default): in lockstep, as fast as the node answers; or a multiple of real time")
+    parser.add_argument("--speed", default="max", metavar="X", help="max (default), or a multiple of real time; 1 is real time, with the node's timer, any other in lockstep")
     parser.add_argument("--out", metavar="DIR", help="write run.log, run.json, signals.csv, labels.csv, the DBC and report.html there")
     _expect(parser)
     _bus(parser)
@@ -74,7 +90,7 @@ def _drive(parser: argparse.ArgumentParser) -> None:
 
 def build_parser() -> argparse.ArgumentParser:
     """All options of all subcommands."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="hullguard", description="Event-triggered, set-based fault detection on ECUs over CAN.", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=f"hullguard {__version__}")

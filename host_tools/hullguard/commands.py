@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
 import signal
 import subprocess
@@ -26,6 +27,7 @@ from hullguard.design import store
 from hullguard.design.design import Design, design, finish, stored_for
 from hullguard.errors import BusError, ExpectationError, InputError
 from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_override
+from hullguard.model.schema import FAULTS_MAX
 from hullguard.plant.detect import Detector, from_bus, from_log
 from hullguard.plant.recording import read_recording
 from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, summary, write_files
@@ -80,6 +82,14 @@ def progress(args: argparse.Namespace, title: str) -> Iterator[Callable[[str, in
         yield tick
 
 
+def make_folder(path: Path) -> None:
+    """The folder of --out."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {path}: cannot be made a folder ({error.strerror}); name another") from error
+
+
 def emit(args: argparse.Namespace, result: dict[str, Any]) -> None:
     """The JSON object, when asked for."""
     if args.json:
@@ -127,7 +137,7 @@ def run_design(args: argparse.Namespace) -> int:
         stored, own = stored_for(model, args.fresh, tick)
     made = finish(model, stored)
     out = Path(args.out) if args.out else Path("build") / model.name
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     beside = store.path_of(model.path)
     if not own and not overrides:
         try:
@@ -161,6 +171,8 @@ def run_design(args: argparse.Namespace) -> int:
 def the_faults(args: argparse.Namespace, model: Model, scenario: Sequence[FaultSpec], samples: int) -> list[FaultSpec]:
     """Faults of the command line, or else of the scenario; each must exist and start within the run."""
     faults = [parse_fault(text) for text in args.fault] if args.fault else ([] if args.no_fault else list(scenario))
+    if len(faults) > FAULTS_MAX:
+        raise InputError(f"{len(faults)} faults: a run has room for {FAULTS_MAX}")
     for f in faults:
         model.signal(f.name)
         if f.start >= samples:
@@ -170,8 +182,6 @@ def the_faults(args: argparse.Namespace, model: Model, scenario: Sequence[FaultS
 
 def run_run(args: argparse.Namespace) -> int:
     """Hullguard run."""
-    if args.seed < 0:
-        raise InputError(f"--seed {args.seed}: expected 0 or more")
     model, made = prepared(args)
     scenario = model.scenario(args.scenario)
     samples = args.samples or scenario.samples
@@ -199,7 +209,7 @@ def _drive(args: argparse.Namespace, made: Design, native: Native, source: Sourc
         return _drive_inside(args)
     out = Path(args.out) if args.out else None
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
     with _bus(args, made, native, options, start) as (bus, pace, name):
         say(args, f"bus: {name}")
         log = candump.Writer(out / "run.log", name.split()[0] if not isinstance(bus, InProcess) else "vcan0") if out else None
@@ -264,7 +274,8 @@ def bus_options(args: argparse.Namespace) -> dict[str, Any]:
 @contextlib.contextmanager
 def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any], start: int) -> Iterator[tuple[Bus, Pace, str]]:
     """The bus of a run, with a detector node at its other end."""
-    pace = Pace(True) if args.speed == "max" else Pace(False, _speed(args.speed))
+    speed = _speed(args.speed)
+    pace = Pace(speed != 1.0, speed)  # only a real-time run uses the node's timer; at any other speed the run is deterministic
     if not options and args.bus == "auto":
         found = choose.existing_vcan()
         if found is None and INSIDE in os.environ:
@@ -285,6 +296,8 @@ def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[s
 
 
 def _speed(text: str) -> float:
+    if text == "max":
+        return math.inf
     try:
         speed = float(text)
     except ValueError:
@@ -378,7 +391,7 @@ def run_plant(args: argparse.Namespace) -> int:
     native = Native(library(args.real), made.tables)
     source = Plant(native, made, scenario.reference, faults, args.seed)
     options = bus_options(args) or {"interface": "socketcan", "channel": choose.existing_vcan() or "vcan0"}
-    pace = Pace(args.lockstep, _speed(args.speed) if args.speed != "max" else 1e5)
+    pace = Pace(args.lockstep, _speed(args.speed))
     with opened(**options) as link:
         run = Run(made, native, OnCan(link, native, pace), pace)
         trace = run.samples(source, samples)
@@ -471,7 +484,7 @@ def run_campaign(args: argparse.Namespace) -> int:
         say(args, f"{', '.join(str(f) for f in faults)}: found in {result['detected_runs']} of {args.runs} runs, {delay}")
     if args.out:
         out = Path(args.out)
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         (out / "campaign.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     emit(args, result)
     if args.expect == "quiet" and (alarms["provisional"] or (faults and result["detected_runs"])):

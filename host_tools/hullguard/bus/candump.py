@@ -71,6 +71,8 @@ def _entry(raw: str, where: str) -> Entry:
     flags = EXTENDED if len(found["id"]) == 8 else 0
     if flags and number & _ERROR_BIT:
         flags, number = ERROR, number & ~_ERROR_BIT
+    if rest == "#":
+        raise InputError(f"{where}: '##' without the digit of FD flags")
     if rest.startswith("#"):
         flags |= FD | (BRS if len(rest) > 1 and int(rest[1], 16) & 1 else 0)
         rest = rest[2:]

@@ -290,7 +290,7 @@ def fault_array(library: Library, model: Model, faults: Sequence[FaultSpec]) -> 
         applied = any(g.applied_as_sent and signal in g.signals for g in model.groups)
         actuator = named[0].type == "actuator" if named else applied
         made[i].signal, made[i].actuator, made[i].kind = signal, int(actuator), FAULT_KINDS[f.kind]
-        made[i].size, made[i].start, made[i].end = f.size, f.start, FOREVER if f.end is None else f.end
+        made[i].size, made[i].start, made[i].end = f.size, f.start, FOREVER if f.end is None else min(f.end, FOREVER)
     return made
 
 

@@ -7,6 +7,7 @@ lockstep its verdicts must be the remote node's.
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -55,10 +56,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast: lockstep waits for the node's verdict on every tick, otherwise `speed` times real time."""
+    """How fast: at most `speed` times real time; lockstep waits for the node's verdict on every tick, without it the node's timer keeps time."""
 
     lockstep: bool
-    speed: float = 1.0
+    speed: float = math.inf
 
 
 class Bus(Protocol):
@@ -126,7 +127,7 @@ class Run:
         started = time.monotonic()
         period = self.design.model.sample_time_s
         for k in range(count):
-            if not self.pace.lockstep:
+            if math.isfinite(self.pace.speed):
                 time.sleep(max(0.0, started + k * period / self.pace.speed - time.monotonic()))
             self._sample(source, k, k * period)
             if watch is not None:
