@@ -4,8 +4,8 @@
 
 uint32_t hg_detector_reals(const hg_detector_config *config)
 {
-    uint32_t reals = (3U * (uint32_t)config->signals) + (2U * (uint32_t)config->residuals) + HG_RADII_REALS(config->signals,
-        config->history);
+    uint32_t reals = (3U * (uint32_t)config->signals) + (2U * (uint32_t)config->residuals);
+    reals += HG_RADII_REALS(config->signals, config->history);
     for (uint8_t g = 0U; g < config->generators; g++) {
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
     }

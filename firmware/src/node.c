@@ -277,8 +277,8 @@ static void put_verdict(hg_node *self, const hg_verdict *verdict, bool reply, hg
 {
     const hg_message *message = self->config->verdict;
     *frame = blank(message);
-    frame->data[2] = (uint8_t)((uint32_t)verdict->plant | ((uint32_t)verdict->basis << 2U) | (reply ? 0x10U :
-        0U) | (verdict->refused ? 0x20U : 0U));
+    const uint32_t flags = (reply ? 0x10U : 0U) | (verdict->refused ? 0x20U : 0U);
+    frame->data[2] = (uint8_t)((uint32_t)verdict->plant | ((uint32_t)verdict->basis << 2U) | flags);
     frame->data[3] = (uint8_t)(verdict->candidates & 0xFFU);
     frame->data[4] = (uint8_t)((verdict->candidates >> 8U) & 0xFFU);
     frame->data[5] = (uint8_t)(verdict->bus & 0xFFU);
