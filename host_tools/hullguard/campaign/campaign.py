@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
-from collections.abc import Callable, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any
@@ -42,6 +45,19 @@ def chunk(job: Job, first: int, count: int) -> list[dict[str, Any]]:
     return Batch(native, design, job.samples, job.reference, job.faults, job.seed, job.loss, job.start).runs(first, count)
 
 
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes started in here do not hear Ctrl-C: it is the parent's to end them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def campaign(job: Job, runs: int, workers: int, tick: Callable[[int], None]) -> list[dict[str, Any]]:
     """All rows, in the order of the runs. `tick` gets the number of runs that have just ended."""
     parts = [(first, min(CHUNK, runs - first)) for first in range(0, runs, CHUNK)]
@@ -52,10 +68,16 @@ def campaign(job: Job, runs: int, workers: int, tick: Callable[[int], None]) -> 
             tick(count)
         return rows
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        waiting = {pool.submit(chunk, job, first, count): count for first, count in parts}
-        for done in as_completed(waiting):
-            rows += done.result()
-            tick(waiting[done])
+        with _deaf():  # each of the first tasks starts a worker
+            waiting = {pool.submit(chunk, job, first, count): count for first, count in parts[:workers]}
+        try:
+            waiting |= {pool.submit(chunk, job, first, count): count for first, count in parts[workers:]}
+            for done in as_completed(waiting):
+                rows += done.result()
+                tick(waiting[done])
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     return sorted(rows, key=lambda r: int(r["run"]))
 
 

@@ -56,7 +56,7 @@ enum { HGH_REST = 0, HGH_STEPS = 1, HGH_RAMPS = 2, HGH_SINES = 3, HGH_MIXED = 4 
 typedef struct {
     int32_t kind;
     int32_t period;    /* samples */
-    double  amplitude; /* share of the reference bound, 0 .. 1 keeps the model's bounds */
+    double  amplitude; /* input units; each input's reference bound limits it */
 } hgh_reference;
 
 typedef struct {                        /* x+ = A x + B u + Ed d, y = C x + D u + Fd d, u = -gain (x - equilibrium) + reference */

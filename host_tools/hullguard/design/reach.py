@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hullguard.errors import InputError
 from hullguard.model.schema import Model, Signal
@@ -80,19 +81,40 @@ def reach(model: Model, horizon: int) -> Reach:
 
 
 def _declared_states(model: Model, state: Array) -> Array:
-    """A state that is itself an output stays within that output's range; any other needs the reachable set."""
+    """Bounds of the states: what the loop can reach, what is declared, the range of an output that is the state itself, or what these drive."""
     plant = model.plant
-    out = state.copy()
+    out = np.minimum(state, plant.state_range)
     for row, i in enumerate(model.outputs):
         places = np.flatnonzero(plant.C[row])
         if len(places) == 1 and not plant.D[row].any():
             s = model.signals[i]
             bound = max(abs(s.low), abs(s.high)) / abs(plant.C[row, places[0]])
             out[places[0]] = min(out[places[0]], bound)
-    if not np.all(np.isfinite(out)):
-        name = plant.states[int(np.flatnonzero(~np.isfinite(out))[0])]
-        raise InputError(f"state '{name}' has no bound: measure it, or give [plant] feedback with a stable loop so that its reach can be computed")
+    unknown = ~np.isfinite(out)
+    if unknown.any():
+        out[unknown] = _driven(model, out, unknown)
     return out
+
+
+def _driven(model: Model, bounds: Array, unknown: NDArray[np.bool_]) -> Array:
+    """Reach of the states without a bound of their own, driven by the bounded ones, by inputs within their ranges and by the disturbance."""
+    plant = model.plant
+    own = plant.A[np.ix_(unknown, unknown)]
+    names = ", ".join(np.array(plant.states)[unknown])
+    if np.abs(np.linalg.eigvals(own)).max() >= 1.0:
+        raise InputError(f"no bound for {names}: measure it, declare [plant] state_range, or give [plant] feedback with a stable loop so that its reach can be computed")
+    largest = np.array([max(abs(model.signals[i].low), abs(model.signals[i].high)) for i in model.inputs])
+    drive = np.hstack([plant.A[np.ix_(unknown, ~unknown)] * bounds[~unknown], plant.B[unknown] * largest, plant.Ed[unknown]])
+    power, reached = np.eye(own.shape[0]), np.zeros(own.shape[0])
+    start = (np.abs(plant.equilibrium) + plant.initial_range)[unknown]
+    first = start.copy()
+    for _ in range(HORIZON_MAX):
+        reached += np.abs(power @ drive).sum(1)
+        power = own @ power
+        first = np.maximum(first, np.abs(power) @ start)
+        if np.abs(power).max() < SETTLED:
+            break
+    return reached + first
 
 
 def _sums(A: Array, Bw: Array, Cs: Array, Dw: Array, initial: Array, horizon: int) -> tuple[Array, Array, Array]:

@@ -35,6 +35,7 @@ class Plant:
     Fd: Array  # m x nd
     initial_range: Array  # n: |x(0) - equilibrium| at a start at rest
     equilibrium: Array  # n: the state around which an emulated plant moves
+    state_range: Array  # n: |x| in operation as far as it is declared, infinite where it is not
     feedback: Feedback | None
 
     @property
@@ -135,6 +136,7 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         Fd=Fd,
         initial_range=table.vector("initial_range", n, 0.0),
         equilibrium=table.vector("equilibrium", n) if "equilibrium" in table else np.zeros(n),
+        state_range=table.vector("state_range", n, 0.0) if "state_range" in table else np.full(n, np.inf),
         feedback=_feedback(table, A, B) if "feedback" in table else None,
     )
     table.close()

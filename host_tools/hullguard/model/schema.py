@@ -279,6 +279,9 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     observers = _read_observers(top.table("detector"), outputs, inputs, faults)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     scenarios = _read_scenarios(top, path)
+    network = top.table("network", optional=True)
+    _later(network, "dbc")
+    network.close()
     top.close()
     if sum(g.closing for g in groups) != 1:
         raise InputError(f'{path.name}: exactly one group closes the sample with transmission = "tick"; found {sum(g.closing for g in groups)}')
@@ -323,6 +326,13 @@ def _name(t: Table, *taken: str) -> str:
     if name in taken:
         raise t.error("name", f"'{name}' is the name of a message of the detector; choose another")
     return name
+
+
+def _later(t: Table, *keys: str) -> None:
+    """Refuse keys of the schema that this version cannot honour: ignoring them would promise what is not done."""
+    for key in keys:
+        if key in t:
+            raise t.error(key, "part of the schema, but not of this version; remove it")
 
 
 def _read_signal(t: Table) -> Signal:
@@ -470,6 +480,7 @@ def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
 
 
 def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...]) -> tuple[Observer, ...]:
+    _later(t, "bank", "zonotope")
     t.text("threshold", "exact", ["exact"])
     t.text("number", "f32", ["f32", "f64"])
     observers = []
