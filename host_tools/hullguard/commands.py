@@ -127,7 +127,7 @@ def _by_fault(made: Design, faults: Sequence[int], values: Any) -> dict[str, flo
 
 
 def run_design(args: argparse.Namespace) -> int:
-    """Hullguard design."""
+    """`hullguard design`."""
     from hullguard.codegen import write_all
     from hullguard.report.design_report import write_design_report
 
@@ -181,7 +181,7 @@ def the_faults(args: argparse.Namespace, model: Model, scenario: Sequence[FaultS
 
 
 def run_run(args: argparse.Namespace) -> int:
-    """Hullguard run."""
+    """`hullguard run`."""
     model, made = prepared(args)
     scenario = model.scenario(args.scenario)
     samples = args.samples or scenario.samples
@@ -192,7 +192,7 @@ def run_run(args: argparse.Namespace) -> int:
 
 
 def run_replay(args: argparse.Namespace) -> int:
-    """Hullguard replay."""
+    """`hullguard replay`."""
     model, made = prepared(args)
     series = read_recording(Path(args.csv), model)
     samples = min(args.samples or len(series), len(series))
@@ -383,7 +383,7 @@ def _expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
 
 
 def run_plant(args: argparse.Namespace) -> int:
-    """Hullguard plant: the emulator alone."""
+    """`hullguard plant`: the emulator alone."""
     model, made = prepared(args)
     scenario = model.scenario(args.scenario)
     samples = args.samples or scenario.samples
@@ -403,15 +403,26 @@ def run_plant(args: argparse.Namespace) -> int:
     return 0
 
 
+@contextlib.contextmanager
+def signalled() -> Iterator[Callable[[], bool]]:
+    """Whether SIGINT or SIGTERM has come; inside, neither ends the process by itself."""
+    came: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(came)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def run_detect(args: argparse.Namespace) -> int:
-    """Hullguard detect."""
+    """`hullguard detect`."""
     _, made = prepared(args)
     native = Native(library(args.real), made.tables)
-    stopped: list[int] = []
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        stopped.append(number)
-
     changes: list[dict[str, Any]] = []
 
     def watch(v: Verdict) -> None:
@@ -429,13 +440,11 @@ def run_detect(args: argparse.Namespace) -> int:
         options = bus_options(args)
         if not options:
             raise InputError("detect needs a bus (-i INTERFACE -c CHANNEL) or a log (--log FILE)")
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, stop)
-        with opened(**options) as link:
+        with signalled() as stopped, opened(**options) as link:
             detector = Detector(native, start, args.lockstep, None if args.listen else link.send, watch)
             if args.ready:
                 print("ready", flush=True)
-            from_bus(detector, link, made.model.sample_time_s, not args.lockstep, args.samples or 0, lambda: bool(stopped))
+            from_bus(detector, link, made.model.sample_time_s, not args.lockstep, args.samples or 0, stopped)
     health = detector.node.health()
     say(args, f"{detector.samples} samples; " + ", ".join(f"{n} {c}" for n, c in health.items() if c))
     emit(args, {"model": made.model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "samples": detector.samples, "communication": health, "verdicts": changes})
@@ -451,7 +460,7 @@ def run_detect(args: argparse.Namespace) -> int:
 
 
 def run_campaign(args: argparse.Namespace) -> int:
-    """Hullguard campaign."""
+    """`hullguard campaign`."""
     if not 0.0 <= args.loss < 1.0:
         raise InputError(f"--loss {args.loss:g}: expected a probability from 0 to below 1")
     if args.runs < 1:
@@ -495,7 +504,7 @@ def run_campaign(args: argparse.Namespace) -> int:
 
 
 def run_report(args: argparse.Namespace) -> int:
-    """Hullguard report."""
+    """`hullguard report`."""
     directory = Path(args.directory)
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give the --out folder of a run")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import socket
+import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -15,7 +17,9 @@ from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE
 from hullguard.core.native import Frame
 from hullguard.errors import BusError
 
-RECEIVE_BUFFER = 4 << 20  # bytes; python-can's default holds 278 frames
+logging.getLogger("can").addHandler(logging.NullHandler())  # what goes wrong comes as an exception and is told in one line
+RECEIVE_BUFFER = 4 << 20  # bytes; python-can's default holds 278 frames, and the system's limit without privilege twice that
+SO_RCVBUFFORCE = 33  # Linux; Python has no name for it
 SEND_PATIENCE_S = 1.0
 
 
@@ -47,8 +51,9 @@ class CanLink:
         self.channel = str(getattr(bus, "channel", "can0"))
         raw = getattr(bus, "socket", None)
         if isinstance(raw, socket.socket):
-            with contextlib.suppress(OSError):
-                raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            for option in (socket.SO_RCVBUF, SO_RCVBUFFORCE) if sys.platform == "linux" else (socket.SO_RCVBUF,):
+                with contextlib.suppress(OSError):
+                    raw.setsockopt(socket.SOL_SOCKET, option, RECEIVE_BUFFER)
 
     def send(self, frame: Frame) -> None:
         """Send one frame; a full queue is waited for, a dead bus is an error."""
@@ -85,7 +90,8 @@ def opened(**options: Any) -> Iterator[CanLink]:
     try:
         bus = can.Bus(**options)
     except (can.CanError, can.CanInterfaceNotImplementedError, OSError, ValueError, ImportError, TypeError) as error:
-        cure = "create it with: ip link add dev vcan0 type vcan && ip link set vcan0 up" if options.get("interface") == "socketcan" else "check -i, -c and its driver"
+        channel = options.get("channel")
+        cure = f"create it with: ip link add dev {channel} type vcan && ip link set {channel} up" if options.get("interface") == "socketcan" else "check -i, -c and its driver"
         raise BusError(f"bus {name} cannot be opened: {error}; {cure}") from error
     link = CanLink(bus)
     try:
