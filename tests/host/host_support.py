@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT / "host_tools"))
 import pytest  # noqa: E402
 from hullguard.cli import main  # noqa: E402
 from hullguard.core.library import Library, library  # noqa: E402
-from hullguard.core.native import Batch, Native  # noqa: E402
+from hullguard.core.native import Batch, Frame, Native  # noqa: E402
 from hullguard.design.design import Design, design  # noqa: E402
 from hullguard.model import load_model, parse_fault  # noqa: E402
 from hullguard.model.schema import Reference  # noqa: E402
@@ -135,8 +135,46 @@ def build_library(folder: Path, real: str, patch: dict[str, list[tuple[str, str]
     files = [str(f) for f in sorted(source.glob("*.c"))]
     subprocess.run(["gcc", *FLAGS, defined, *INCLUDE, "-I", str(source), *includes, "-shared", "-Wl,--no-undefined", "-o", str(shared), *files, "-lm"], check=True)
     declare = ROOT / "host_tools" / "hullguard" / "core" / "declare"
-    done = subprocess.run(
-        ["gcc", "-E", "-P", "-nostdinc", defined, "-I", str(declare), *INCLUDE, str(source / "host.h")], check=True, capture_output=True, text=True
-    )
+    done = subprocess.run(["gcc", "-E", "-P", "-nostdinc", defined, "-I", str(declare), *INCLUDE, str(source / "host.h")], check=True, capture_output=True, text=True)
     (folder / f"hullguard_{real}.i").write_text(done.stdout, encoding="utf-8")
     return Library(real, folder)
+
+
+# ---- bits of classic frames, without the library ----
+
+EXTENDED, REMOTE = 0x01, 0x02
+
+
+def crc15(bits: list[int]) -> list[int]:
+    """x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 by long division."""
+    polynomial = [1 if e in (15, 14, 10, 8, 7, 4, 3, 0) else 0 for e in range(15, -1, -1)]
+    rest = bits + [0] * 15
+    for i in range(len(bits)):
+        if rest[i]:
+            for j, p in enumerate(polynomial):
+                rest[i + j] ^= p
+    return rest[-15:]
+
+
+def binary(value: int, width: int) -> list[int]:
+    return [int(c) for c in format(value, f"0{width}b")]
+
+
+def stuffed(bits: list[int]) -> list[int]:
+    out: list[int] = []
+    for bit in bits:
+        out.append(bit)
+        if len(out) >= 5 and len(set(out[-5:])) == 1:
+            out.append(1 - bit)
+    return out
+
+
+def classic_bits(frame: Frame) -> int:
+    """Start of frame to interframe space of a classic frame (ISO 11898-1)."""
+    remote = int(bool(frame.flags & REMOTE))
+    if frame.flags & EXTENDED:
+        header = [0, *binary(frame.id >> 18, 11), 1, 1, *binary(frame.id & 0x3FFFF, 18), remote, 0, 0]
+    else:
+        header = [0, *binary(frame.id, 11), remote, 0, 0]
+    bits = header + binary(len(frame.data), 4) + [b for byte in frame.data for b in binary(byte, 8)]
+    return len(stuffed(bits + crc15(bits))) + 1 + 2 + 7 + 3

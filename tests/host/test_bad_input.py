@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 import tomli_w
+from host_support import ROOT, SEED, Cli, Models, Result
 from hullguard.core.library import library
 from hullguard.core.native import REST, Frame, Node, Plant, Sender
 from hullguard.errors import InputError
 from hullguard.model import load_model, parse_fault, parse_override
 from hullguard.model.schema import SHIPPED, parse_model
-from host_support import ROOT, SEED, Cli, Models, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -536,7 +536,11 @@ def test_a_log_of_every_kind_of_foreign_frame_is_read_and_raises_no_alarm(cli: C
 
 # ---- anything at all ----
 
-anything = st.recursive(st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5), lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=5), x, max_size=3), max_leaves=5)
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=5), x, max_size=3),
+    max_leaves=5,
+)
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:

@@ -83,7 +83,7 @@ resolution = 0.1
 slew = [1.0, 2.0]
 
 [[groups]]
-name = "levels in tank"
+name = "levels_in_tank"
 signals = ["level1_m", "level2_m", "level3_m"]
 frame = { id = 0x210, fd = true }
 trigger = { delta = [0.01, 0.05], sigma = [0.05, 0.05, 0.1], silence = [0, 2], levels = 3, interval_max = 6 }

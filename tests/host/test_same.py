@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host_support import REALS, SEED, SILENT_1, Cli, Models, Ready, build_library
 from hullguard.campaign.campaign import Job, campaign
 from hullguard.codegen import emit_c
 from hullguard.core.library import Library
 from hullguard.core.native import PLANT_STATES, REST, Frame, Native, Node, Plant, Sender, bus_of
 from hullguard.model import parse_fault
 from hullguard.plant.run import InProcess, Pace, Run, Trace
-from host_support import REALS, SEED, SILENT_1, Cli, Models, Ready, build_library
 
 FAULTS = ("controller2:bias:1.0@60", "gap12_m:freeze@100..120", "speed1_mps:noise:0.1@130", "controller1:gain:0.5@20..40", "gap23_m:drift:0.2@140")
 

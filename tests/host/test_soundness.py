@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host_support import SEED, Alarms, alarms
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Batch, Native
 from hullguard.design.design import Design, design
 from hullguard.errors import InputError
 from hullguard.model.schema import Reference, parse_model
-from host_support import SEED, Alarms, alarms
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -191,9 +191,7 @@ def test_no_healthy_random_plant_raises_an_alarm(random_designs: tuple[list[tupl
 
 @pytest.mark.parametrize("start", [REST, MOVING], ids=["rest", "moving"])
 @pytest.mark.parametrize("loss", [0.1, 0.5])
-def test_no_alarm_of_a_healthy_random_plant_is_confirmed_whatever_is_lost(
-    random_designs: tuple[list[tuple[int, Design]], list[str]], start: int, loss: float
-) -> None:
+def test_no_alarm_of_a_healthy_random_plant_is_confirmed_whatever_is_lost(random_designs: tuple[list[tuple[int, Design]], list[str]], start: int, loss: float) -> None:
     lost = 0
     for number, made in random_designs[0]:
         native = Native(library("f32"), made.tables)

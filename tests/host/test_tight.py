@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host_support import PERIODIC, REALS, SEED, SILENT_1, SILENT_2, Alarms, Models, Ready, alarms, build_library
 from hullguard.core.library import Library, library
 from hullguard.design import hull
 from scipy.optimize import linprog
-from host_support import PERIODIC, REALS, SEED, SILENT_1, SILENT_2, Alarms, Models, Ready, alarms, build_library
 
 OUTPUTS, INPUTS = 3, 3
 # Quantisation is no disturbance that a test can choose; ten times finer codes make it small.

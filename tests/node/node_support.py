@@ -14,7 +14,8 @@ NODE = {"f32": BUILD / "bin" / "detector_node", "f64": BUILD / "bin" / "detector
 BUS_TIMER = BUILD / "node" / "bus_timer"
 ORACLE_RUN = BUILD / "oracle" / "oracle_run"
 WITH_VCAN = BUILD / "with-vcan" / "with-vcan"
-SEED = int(os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little"))
+# The seed of tests/host when both run in one session.
+SEED = getattr(sys.modules.get("host_support"), "SEED", None) or int(os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little"))
 
 Result = subprocess.CompletedProcess[str]
 
@@ -40,12 +41,9 @@ def in_guest(*arguments: object, interfaces: int = 1, timeout_s: int = 100) -> l
     return [str(WITH_VCAN), "-n", str(interfaces), "-t", str(timeout_s), *map(str, arguments)]
 
 
-def tests_inside(file: str, out: Path, interfaces: int = 1, timeout_s: int = 100) -> None:
+def run_inside(file: str, out: Path, interfaces: int = 1, timeout_s: int = 100) -> None:
     """Run the tests of a file where vcan0 exists; what fails there fails here, with its text."""
-    done = command(
-        in_guest(sys.executable, "-m", "pytest", "-q", "-rfE", "--tb=short", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--durations=5", f"--basetemp={out}/inside", HERE / file,
-                 interfaces=interfaces, timeout_s=timeout_s),
-        timeout_s + 30,
-    )  # fmt: skip
+    options = ["-q", "-rfE", "--tb=short", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--durations=5", f"--basetemp={out}/inside"]
+    done = command(in_guest(sys.executable, "-m", "pytest", *options, HERE / file, interfaces=interfaces, timeout_s=timeout_s), timeout_s + 30)
     print(done.stdout)
     assert done.returncode == 0, f"{file} inside with-vcan: exit status {done.returncode}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"

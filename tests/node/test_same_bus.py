@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 from hullguard.bus import candump
+from hullguard.core.library import library
+from hullguard.core.native import Native, Plant
 from hullguard.design.design import Design, design
 from hullguard.model import load_model
 from node_support import HERE, ORACLE_RUN, ROOT, SEED, command, in_guest
 
 sys.path.insert(0, str(ROOT / "tests" / "oracle"))
-from export import export  # noqa: E402
+from export import export
 
 
 @dataclass(frozen=True)
@@ -51,11 +53,13 @@ HERE_AND_NOW = [*SINGLE, *DOUBLE]
 BUS_STATES = ("absent", "good", "lossy", "stale")
 PLANTS = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
 
-# How far float64 and the oracle may differ. r: rounding of two orders of summation. J: the library adds proven rounding allowances and cuts
-# the sum off with a bound of its tail, so it is never below the oracle's and at most 2 % above.
-R_TOLERANCE = 1e-7
-J_BELOW = 1e-8
-J_ABOVE = 1.02
+# How far float64 and the oracle may differ. The tables are float32 numbers in every build, and what that can do to a residual is proven and
+# part of the threshold: so J >= J_oracle, and |r - r_oracle| <= J - J_oracle. In fact a thousandth of it is used up.
+R_SHARE = 0.05
+# The rest of J - J_oracle is a bound of the tail that the library cuts off. It remembers wide radii for longer than they matter: 2 % of J as a
+# rule, more for the moments at which radii are much narrower than they were.
+J_ABOVE_MEDIAN = 1.03
+J_ABOVE = 1.08
 
 
 @dataclass(frozen=True)
@@ -145,22 +149,54 @@ def test_no_false_alarm(case: Case, on_vcan: dict[Case, Ended]) -> None:
 # ---- the oracle ----
 
 
-def prepared(case: Case) -> Design:
-    return design(load_model(case.model, {}, case.scenario))[0]
+@dataclass(frozen=True)
+class Chain:
+    """What the second implementation makes of a run's readings."""
+
+    design: Design
+    plant: list[int]
+    bus: list[int]
+    r: np.ndarray
+    J: np.ndarray
 
 
-def oracle(case: Case, run: Ended, folder: Path) -> tuple[np.ndarray, list[str], Design]:
-    """Rows k, plant, bus, r.., J.. of the second implementation, fed with the readings that the run recorded."""
-    ready = prepared(case)
+def settled(native: Native, reading: list[float]) -> list[float]:
+    """Readings of which the library and the oracle take the same code. The library multiplies by codes per unit (1000), the oracle divides by
+    the resolution that its table holds (0.001 as float32 has it): a reading halfway between two codes may become either, and both are within
+    its radius. Such a one is moved onto the library's code."""
+    lib, ffi, out = native.library.lib, native.library.ffi, list(reading)
+    for scale, group in zip(native.scales, native.tables.groups, strict=True):
+        for i, s in enumerate(group.signals):
+            x = out[group.first + i]
+            code = lib.hg_code_encode(ffi.addressof(scale, i), x)
+            if s.minimum <= code <= s.maximum and code != round((x - s.offset) / s.resolution):
+                assert abs(x - (s.offset + code * s.resolution)) < 0.51 * s.resolution
+                out[group.first + i] = s.offset + code * s.resolution
+    return out
+
+
+def oracle(case: Case, run: Ended, folder: Path) -> Chain:
+    """The second implementation, fed with the run's readings: the same emulator again, because signals.csv has nine digits of them."""
+    ready = design(load_model(case.model, {}, case.scenario))[0]
     export(ready, folder / "model.txt")
+    scenario = ready.model.scenario(case.scenario)
+    native = Native(library(case.real), ready.tables)
+    source = Plant(native, ready, scenario.reference, scenario.faults, SEED)
     columns = run.columns()
     names = [s.name for s in ready.model.signals]
     with (folder / "signals.csv").open("w") as file:
         file.write(",".join(names) + "\n")
-        file.writelines(",".join(f"{columns[n][k]:.17g}" for n in names) + "\n" for k in range(len(columns["k"])))
+        for k in range(len(columns["k"])):
+            reading = source.read()
+            source.move()
+            assert np.allclose(reading, [columns[n][k] for n in names], rtol=1e-8, atol=1e-12), f"sample {k}: not the readings of the run"
+            file.write(",".join(f"{x:.17g}" for x in settled(native, reading)) + "\n")
     done = command([str(ORACLE_RUN), str(folder / "model.txt"), str(folder / "signals.csv")])
     assert done.returncode == 0, done.stderr
-    return np.array([[float(x) for x in line.split(",")] for line in done.stdout.splitlines()]), names, ready
+    rows = np.array([[float(x) for x in line.split(",")] for line in done.stdout.splitlines()])
+    width = ready.tables.residuals
+    assert rows.shape == (len(columns["k"]), 3 + 2 * width)
+    return Chain(ready, rows[:, 1].astype(int).tolist(), rows[:, 2].astype(int).tolist(), rows[:, 3 : 3 + width], rows[:, 3 + width :])
 
 
 def bus_bits(run: Ended, groups: list[str]) -> list[int]:
@@ -173,33 +209,43 @@ def bus_bits(run: Ended, groups: list[str]) -> list[int]:
     return bits
 
 
+def residuals(run: Ended) -> tuple[np.ndarray, np.ndarray]:
+    """r and J of the library."""
+    columns = run.columns()
+    labels = [c[1:] for c in columns if c.startswith("r") and f"J{c[1:]}" in columns]
+    return np.column_stack([columns[f"r{name}"] for name in labels]), np.column_stack([columns[f"J{name}"] for name in labels])
+
+
 @pytest.mark.parametrize("case", DOUBLE, ids=lambda c: c.name)
 def test_float64_against_the_oracle(case: Case, in_process: dict[Case, Ended], tmp_path: Path) -> None:
     run = in_process[case]
-    rows, _, ready = oracle(case, run, tmp_path)
-    columns = run.columns()
-    labels = [c[1:] for c in columns if c.startswith("r") and f"J{c[1:]}" in columns]
-    width = len(labels)
-    assert rows.shape == (run.result["samples"], 3 + 2 * width)
-    r, J = (np.column_stack([columns[letter + name] for name in labels]) for letter in "rJ")
-    r_oracle, J_oracle = rows[:, 3 : 3 + width], rows[:, 3 + width :]
-    difference, ratio = np.abs(r - r_oracle) / J_oracle, J / J_oracle
-    print(f"|r - oracle| / J at most {difference.max():.3g}, J / oracle {ratio.min():.9f} .. {ratio.max():.9f}")
-    assert difference.max() <= R_TOLERANCE, f"sample {difference.max(axis=1).argmax()}"
-    assert ratio.min() >= 1.0 - J_BELOW, f"a threshold below the exact one, sample {ratio.min(axis=1).argmin()}"
+    exact = oracle(case, run, tmp_path)
+    r, J = residuals(run)
+    above, ratio = J - exact.J, J / exact.J
+    share = np.abs(r - exact.r) / above
+    print(f"|r - oracle| at most {share.max():.3g} of J - oracle; J / oracle {ratio.min():.6f} .. {ratio.max():.6f}, median {np.median(ratio, axis=0).max():.6f}")
+    assert above.min() > 0.0, f"a threshold below the exact one, sample {above.min(axis=1).argmin()}"
+    assert share.max() <= R_SHARE, f"sample {share.max(axis=1).argmax()}"
+    assert np.median(ratio, axis=0).max() <= J_ABOVE_MEDIAN
     assert ratio.max() <= J_ABOVE, f"sample {ratio.max(axis=1).argmax()}"
-    assert rows[:, 1].astype(int).tolist() == columns["plant"].astype(int).tolist()
-    assert rows[:, 2].astype(int).tolist() == bus_bits(run, [g.name for g in ready.tables.groups])
+    assert exact.bus == bus_bits(run, [g.name for g in exact.design.tables.groups])
+    # A residual between the two thresholds is an alarm of the oracle alone: up to there the states are the same, sample by sample.
+    between = np.flatnonzero(((np.abs(exact.r) > exact.J) & (np.abs(r) <= J)).any(axis=1))
+    same = int(between[0]) if len(between) else len(exact.plant)
+    assert run.columns()["plant"].astype(int).tolist()[:same] == exact.plant[:same]
     if run.result["faults"]:
-        assert PLANTS["confirmed"] in rows[:, 1], "the oracle finds the fault as well"
+        assert PLANTS["confirmed"] in exact.plant, "the oracle finds the fault as well"
+    else:
+        assert same == len(exact.plant), "a healthy plant has no residual above the exact threshold"
 
 
 @pytest.mark.parametrize("case", SINGLE, ids=lambda c: c.name)
-def test_float32_verdicts_are_the_oracles(case: Case, in_process: dict[Case, Ended], tmp_path: Path) -> None:
-    """Single precision widens its thresholds by what it may round: an alarm of its own is the oracle's too."""
+def test_an_alarm_in_float32_is_the_oracles_too(case: Case, in_process: dict[Case, Ended], tmp_path: Path) -> None:
+    """Single precision widens its thresholds by all that it may round."""
     run = in_process[case]
-    rows, *_ = oracle(case, run, tmp_path)
-    alarms, exact = run.columns()["plant"] >= PLANTS["provisional"], np.abs(rows[:, 3 : 3 + (rows.shape[1] - 3) // 2]) > rows[:, 3 + (rows.shape[1] - 3) // 2 :]
-    first, first_exact = np.flatnonzero(alarms), np.flatnonzero(exact.any(axis=1))
-    if len(first):
-        assert len(first_exact) and first_exact[0] <= first[0]
+    exact = oracle(case, run, tmp_path)
+    r, J = residuals(run)
+    assert (J > exact.J * (1.0 - 1e-6)).all()
+    alarms, own = (np.abs(exact.r) > exact.J).any(axis=1), (np.abs(r) > J).any(axis=1)
+    assert not (own & ~alarms).any(), f"sample {np.flatnonzero(own & ~alarms)[:1]}: an alarm that the oracle does not see"
+    assert own.any() == bool(run.result["faults"])

@@ -77,7 +77,7 @@ def read(folder: Path, name: str) -> Seen:
 
 def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(timing_files: Path) -> None:
     seen = read(timing_files, "steady")
-    print(f"{len(seen.misses)} deadlines missed, {len(seen.gaps)} gaps; longest {seen.watch['longest_tick_us']} us between ticks, {seen.watch['longest_wake_us']} us between wake-ups")
+    print(f"{len(seen.misses)} missed, {len(seen.gaps)} gaps; longest {seen.watch['longest_tick_us']} us between ticks, {seen.watch['longest_wake_us']} us between wake-ups")
     assert seen.watch["last_us"] - seen.watch["first_us"] >= 59.9e6
     assert seen.watch["wakes"] > 0.5 * 6000, "the reference's own timer must have run"
     assert not unexplained(seen.misses, seen.gaps)
@@ -91,7 +91,9 @@ def test_no_frame_is_lost(timing_files: Path) -> None:
     for group in ("measurement", "control"):
         good, lost, refused = seen.health(group)
         assert lost == 0, f"{group}: by its sequence counter"
-        assert good + refused == seen.send[group], f"{group}: {good} booked and {refused} late of {seen.send[group]}"
+        # A second late closing frame running is counted as late and yet booked: the node starts again there (node.h).
+        twice = good + refused - seen.send[group]
+        assert 0 <= twice <= (refused // 2 if group == "control" else 0), f"{group}: {good} booked and {refused} late of {seen.send[group]}"
         assert refused == 0 or seen.misses, f"{group}: {refused} frames refused though every tick came in time"
     assert seen.steps == seen.health("control")[0] + seen.all_misses, "a step has a closing frame or a missed deadline"
 

@@ -1,0 +1,173 @@
+"""For tests that run where vcan0 exists: nodes as processes, and drives whose frames are known before they are sent."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hullguard.bus.link import CanLink, opened
+from hullguard.core.library import library
+from hullguard.core.native import REST, Frame, Native, Node, Plant, Sender, Verdict, read_verdict
+from hullguard.design.design import Design, design
+from hullguard.model import load_model, parse_fault
+from node_support import NODE, SEED, environment
+
+WAIT_S = 10.0
+
+
+@functools.cache
+def ready(model: str = "platoon") -> tuple[Design, Native]:
+    made = design(load_model(model))[0]
+    return made, Native(library("f32"), made.tables)
+
+
+@dataclass
+class Process:
+    """A node; after its end, what it said."""
+
+    popen: subprocess.Popen[str]
+    status: int | None = None
+    lines: list[str] = field(default_factory=list)
+    err: str = ""
+
+    def stop(self, number: int = signal.SIGTERM) -> None:
+        if self.status is None:
+            self.popen.send_signal(number)
+            self.wait()
+
+    def wait(self, timeout_s: float = WAIT_S) -> None:
+        out, self.err = self.popen.communicate(timeout=timeout_s)
+        self.lines, self.status = out.splitlines(), self.popen.returncode
+
+
+@contextlib.contextmanager
+def process(*command: object) -> Iterator[Process]:
+    """A program that prints 'ready' first; stopped at the end unless it has been before."""
+    popen = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment())
+    made = Process(popen)
+    try:
+        assert popen.stdout is not None
+        first = popen.stdout.readline()
+        if first != "ready\n":
+            made.wait()
+            raise AssertionError(f"{command}: said {first!r}, status {made.status}: {made.err}")
+        yield made
+    finally:
+        made.stop()
+
+
+def node(*options: object) -> contextlib.AbstractContextManager[Process]:
+    return process(NODE["f32"], *options)
+
+
+def detect(*options: object) -> contextlib.AbstractContextManager[Process]:
+    return process(sys.executable, "-m", "hullguard", "detect", *options)
+
+
+def link(channel: str = "vcan0") -> contextlib.AbstractContextManager[CanLink]:
+    return opened(interface="socketcan", channel=channel, fd=True)
+
+
+def reachable(native: Native, frame: Frame) -> bool:
+    """Does the node's acceptance filter let a frame pass? Identifier, identifier type and kind count."""
+    return any((frame.id, frame.flags & 3) == (g.message.id, g.message.flags & 3) for g in native.tables.groups)
+
+
+class Drive:
+    """Frames of an emulated plant, and a node in this process that gets what the one on the bus gets."""
+
+    def __init__(self, model: str = "platoon", scenario: str = "manoeuvres", faults: tuple[str, ...] = (), seed: int = SEED) -> None:
+        self.design, self.native = ready(model)
+        self.source = Plant(self.native, self.design, self.design.model.scenario(scenario).reference, [parse_fault(f) for f in faults], seed)
+        self.sender, self.shadow, self.k = Sender(self.native), Node(self.native, REST), 0
+        closing = self.native.tables.closing
+        self.order = [g for g in range(len(self.native.tables.groups)) if g != closing] + [closing]
+
+    def sample(self) -> tuple[list[Frame], Frame]:
+        """Measurement frames and the closing frame of the next sample."""
+        reading = self.source.read()
+        self.source.move()
+        frames = [f for g in self.order if (f := self.sender.step(g, self.k, reading)) is not None]
+        self.k += 1
+        return frames[:-1], frames[-1]
+
+    def take(self, frames: list[Frame], lockstep: bool = True) -> tuple[list[Verdict], list[Frame]]:
+        """What the node makes of frames: the verdict of each step, and what it sends."""
+        verdicts, sent = [], []
+        for frame in frames:
+            if not reachable(self.native, frame):
+                continue
+            self.shadow.receive(frame)
+            while (verdict := self.shadow.step()) is not None:
+                verdicts.append(verdict)
+                sent += self.shadow.report(lockstep)
+        return verdicts, sent
+
+    def told(self, frame: Frame) -> Verdict:
+        verdict = read_verdict(self.native, frame)
+        assert verdict is not None, f"not a good verdict frame: {frame}"
+        return verdict
+
+    @property
+    def verdict_id(self) -> int:
+        return int(self.native.tables.verdict.id)
+
+    @property
+    def status_id(self) -> int:
+        return int(self.native.tables.status.id)
+
+
+def collect(bus: CanLink, ids: set[int], count: int, timeout_s: float = WAIT_S) -> list[Frame]:
+    """The next `count` frames with these identifiers."""
+    found: list[Frame] = []
+    end = time.monotonic() + timeout_s
+    while len(found) < count:
+        got = bus.receive(max(0.0, end - time.monotonic()))
+        assert got is not None, f"{len(found)} of {count} frames with {[hex(i) for i in sorted(ids)]} came"
+        if got[0].id in ids:
+            found.append(got[0])
+    return found
+
+
+def silent(bus: CanLink, ids: set[int], for_s: float = 0.2) -> bool:
+    end = time.monotonic() + for_s
+    while (left := end - time.monotonic()) > 0:
+        got = bus.receive(left)
+        if got is not None and got[0].id in ids:
+            return False
+    return True
+
+
+def exchange(bus: CanLink, drive: Drive, frames: list[Frame]) -> list[Verdict]:
+    """Send frames of one sample, closing frame last; the node on the bus must answer what the one in this process answers."""
+    verdicts, expected = drive.take(frames)
+    for frame in frames:
+        bus.send(frame)
+    got = collect(bus, {drive.verdict_id, drive.status_id}, len(expected))
+    assert got == expected, f"sample {drive.k - 1}: {[drive.told(f) for f in got if f.id == drive.verdict_id]}, expected {verdicts}"
+    return verdicts
+
+
+def health(process_: Process) -> dict[str, dict[str, Any]]:
+    """Last status line: group -> bus, good, lost, refused."""
+    rows = {}
+    for word in process_.lines[-1].split():
+        name, _, rest = word.partition("=")
+        if "/good:" in rest:
+            bus, *counts = rest.split("/")
+            rows[name] = {"bus": bus} | {c.split(":")[0]: int(c.split(":")[1]) for c in counts}
+    return rows
+
+
+def folder(path: Path, name: str) -> Path:
+    made = path / name
+    made.mkdir()
+    return made
