@@ -264,7 +264,7 @@ def test_a_campaign_says_all_that_the_design_promises(cli: Cli, tmp_path: Path) 
     assert found == json.loads((tmp_path / "campaign.json").read_text(encoding="utf-8"))
     assert (found["runs"], found["samples"], len(found["rows"])) == (8, 200, 8)
     assert [r["run"] for r in found["rows"]] == list(range(8))
-    assert found["false_alarm_runs"] == {"provisional": 0, "confirmed": 0}
+    assert (found["false_alarm_runs"], found["provisional_alarm_runs"]) == (0, 0)
     delays = [r["provisional_at"] - 150 for r in found["rows"]]
     assert found["delay_mean"] == pytest.approx(np.mean(delays))
     assert found["delay_max"] == max(delays)

@@ -90,10 +90,8 @@ def digest(rows: Sequence[dict[str, Any]], samples: int, groups: int, faults: Se
     result: dict[str, Any] = {
         "runs": len(rows),
         "samples": samples,
-        "false_alarm_runs": {
-            "provisional": sum(r["false_provisional"] > 0 for r in rows),
-            "confirmed": sum(r["false_confirmed"] > 0 for r in rows),
-        },
+        "false_alarm_runs": sum(r["false_confirmed"] > 0 for r in rows),
+        "provisional_alarm_runs": sum(r["false_provisional"] > 0 for r in rows),
         "measurement_share": measured / max(1, len(rows) * samples * groups),
         "frames_lost": sum(r["lost"] for r in rows),
         "margin_max": max((r["margin"] for r in rows), default=0.0),
