@@ -147,9 +147,9 @@ static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_h
     }
     uint8_t ahead = (uint8_t)((header->stamp - self->k) & STAMP_MASK);
     if (ahead > STAMP_AHEAD_MAX) {
-        raise16(&health->late, 1U);
         if (!self->slipped) {
             self->slipped = true;
+            raise16(&health->late, 1U);
             return HG_E_STAMP;
         }
         /* Late twice running: not one straggler, this node has lost the sample index. Take the sender's, and trust nothing of the past: how

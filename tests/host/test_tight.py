@@ -102,7 +102,8 @@ def pattern(ready: Ready, loss: float, run: int, samples: int) -> tuple[dict[str
     fresh = np.all(np.abs(trace["radius"][:, :OUTPUTS] - half) < 1e-9, axis=1)
     sent = (trace["events"] & 1) == 1
     radius = trace["radius"][:, :OUTPUTS].copy()
-    slew = np.array(table.slew)
+    span = [s.span for s in table.signals]  # of a group that has been stale
+    slew = np.vstack([np.array(table.slew), np.tile(span, (samples, 1))])
     gaps: list[int] = []
     starts = np.flatnonzero(fresh)
     for begin, end in zip(starts, starts[1:], strict=False):
@@ -205,8 +206,11 @@ def tightest(exact: Models, lib: Library) -> float:
 
 def worst_held(models: Models, lib: Library) -> float:
     ready = models.platoon("manoeuvres", SILENT_1, lib=lib)
-    trace, segment, radius, _ = pattern(ready, 0.0, 3, 61)
-    return max(largest_residual(ready, i, 60, segment, radius) / trace["J"][60, i] for i in residuals(ready))
+    largest = 0.0
+    for run in range(3):
+        trace, segment, radius, _ = pattern(ready, 0.0, run, 81)
+        largest = max(largest, *(largest_residual(ready, i, k, segment, radius) / trace["J"][k, i] for i in residuals(ready) for k in (12, 40, 60, 80)))
+    return largest
 
 
 def test_a_hold_that_ignores_the_silent_phase_is_caught(models: Models, tmp_path: Path) -> None:

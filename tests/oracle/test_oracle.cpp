@@ -1421,7 +1421,7 @@ std::string Chain::compare(Observer &o, size_t at, int k, bool &alarm) const
     const Vector r = o.cascade->step(value.head(m), value.tail(width - m)), J = o.hull->threshold(y, u);
     for (Eigen::Index i = 0; i < r.size(); ++i) {
         const double lib_r = static_cast<double>(self_.r[at + static_cast<size_t>(i)]), lib_J = static_cast<double>(self_.J[at + static_cast<size_t>(i)]);
-        const double tail  = o.tail.output(i) * o.tail.input.maxCoeff() * widest / (1.0 - o.tail.decay);
+        const double tail  = o.tail.output(i) * o.tail.input.sum() * widest / (1.0 - o.tail.decay);
         if (!(std::abs(lib_r - r(i)) <= o.rounding(i) + 1e-12)) { return say("k %d: r %.17g, oracle %.17g", k, lib_r, r(i)); }
         if (!(lib_J >= J(i) * (1.0 - 1e-12))) { return say("k %d: J %.17g below the exact hull %.17g", k, lib_J, J(i)); }
         if (!(lib_J <= (J(i) + o.rounding(i) + 1.1 * tail) * 1.01)) { return say("k %d: J %.17g, exact %.17g, tail at most %g", k, lib_J, J(i), tail); }

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hullguard.errors import InputError
 
 Array = NDArray[np.float64]
+LARGEST = 1e30  # products of a few such numbers stay finite: LAPACK may run for ever on infinity
 
 
 class Table:
@@ -140,6 +141,8 @@ def _shape(rows: int | None, cols: int | None) -> str:
 def _number(value: object, low: float, high: float, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{where}: expected a number, found {_kind(value)}")
+    if abs(value) > LARGEST and abs(value) != math.inf:
+        raise InputError(f"{where}: a number beyond {LARGEST:g}; choose other units")
     if not math.isfinite(value):
         raise InputError(f"{where}: {value} is not a finite number")
     if not low <= value <= high:
