@@ -2,7 +2,8 @@
  *  A detector ECU on Linux: a model's node (hullguard/node.h) on a CAN interface (hal/socketcan).
  *
  *  In lockstep every closing frame is answered with a verdict and no clock is looked at. Otherwise a deadline timer watches the closing
- *  frames: it is set anew by each one, and a sample whose closing frame is overdue is closed without it. */
+ *  frames: it is set anew by each one, and a sample whose closing frame is overdue is closed without it. Where time and steps have come
+ *  apart by more than a stamp can tell, as after the process was stopped, the node is told of an outage. */
 #define _POSIX_C_SOURCE 200809L
 
 #include "models.h"
@@ -25,6 +26,7 @@
 #define SECOND_US 1000000U
 #define PERIOD_MAX_MS 3600000.0
 #define MISSES_MAX 4096U           /* entries of the timing file; more are counted only */
+#define STAMPS_AHEAD 7U            /* samples without a closing frame that the next one's stamp still tells (node.h) */
 #define BEHIND_MAX 255U            /* overdue samples caught up with; by then every group is stale (hold.h) */
 #define PAUSE_FIRST_US 250U        /* of a send's backoff, doubled each time */
 #define PAUSE_ALL_MAX_US 50000U    /* longest time one frame is offered to a bus that has no room */
@@ -61,6 +63,9 @@ typedef struct {
     uint64_t     steps;
     uint64_t     unsent;           /* frames that found no room or no bus */
     uint64_t     missed;           /* deadlines since the first closing frame */
+    uint64_t     outages;          /* told to the node */
+    uint64_t     closing_us;       /* arrival of the last accepted closing frame */
+    uint64_t     closing_steps;    /* `steps` after its own */
     uint32_t     received;         /* frames at the last status line */
     bool         ticking;          /* has a closing frame come? */
 } app;
@@ -304,18 +309,37 @@ static void make_steps(app *self)
     }
 }
 
+/* Has this node fallen behind its sender by more samples than a stamp can tell? Frames that waited for a stopped process carry the time of
+ * their arrival. Any frame of the model tells, not the closing one alone: a measurement could be booked to a sample 16 earlier. */
+static bool outage(const app *self, uint64_t at_us)
+{
+    const uint64_t period_us = self->options.period_us;
+    if (self->options.lockstep || (!self->node->closed) || (at_us < self->closing_us)) {
+        return false;
+    }
+    const uint64_t elapsed = ((at_us - self->closing_us) + (period_us / 2U)) / period_us;
+    return elapsed > ((self->steps - self->closing_steps) + 1U + STAMPS_AHEAD);
+}
+
 static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
 {
+    if (outage(self, at_us)) {
+        hg_node_outage(self->node);
+        self->outages++;
+    }
     hg_status status = hg_node_receive(self->node, frame);
     if (status == HG_E_BUSY) {
         make_steps(self);
         status = hg_node_receive(self->node, frame);
     }
-    if ((status == HG_OK) && (self->node->due > 0U)) { /* it was the closing frame: the next one is expected a period later */
+    const bool closing = (status == HG_OK) && (self->node->due > 0U);
+    make_steps(self);
+    if (closing) { /* the next one is expected a period later */
         self->ticking = true;
+        self->closing_us = at_us;
+        self->closing_steps = self->steps;
         self->deadline_us = self->options.lockstep ? HG_HAL_FOREVER : (at_us + self->options.period_us + self->options.slack_us);
     }
-    make_steps(self);
 }
 
 /* Sample by sample, frames first: what has arrived in time is never overtaken by the timer. */
@@ -357,9 +381,9 @@ static void print_status(app *self)
         (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", self->options.model->group[i], bus[(self->verdict.bus >> (2U * i)) & 0x3U],
                      (unsigned)health->good, (unsigned)health->lost, refused);
     }
-    (void)printf(" frames_per_s=%" PRIu32 " missed=%" PRIu64 " unsent=%" PRIu64 " can=%s errors=%" PRIu32 " dropped=%" PRIu32
-                 " malformed=%" PRIu32 "\n", report.received - self->received, self->missed, self->unsent, can[report.bus], report.errors,
-                 report.lost, report.malformed);
+    (void)printf(" frames_per_s=%" PRIu32 " missed=%" PRIu64 " outages=%" PRIu64 " unsent=%" PRIu64 " can=%s errors=%" PRIu32
+                 " dropped=%" PRIu32 " malformed=%" PRIu32 "\n", report.received - self->received, self->missed, self->outages,
+                 self->unsent, can[report.bus], report.errors, report.lost, report.malformed);
     (void)fflush(stdout);
     self->received = report.received;
 }
@@ -374,7 +398,8 @@ static bool write_timing(const app *self)
         (void)fprintf(stderr, "detector_node: --timing '%s': %s; name a file that can be written\n", self->options.timing, strerror(errno));
         return false;
     }
-    (void)fprintf(file, "# samples %" PRIu64 " missed %" PRIu64 "\n# k due_us noticed_us (CLOCK_MONOTONIC)\n", self->steps, self->missed);
+    (void)fprintf(file, "# samples %" PRIu64 " missed %" PRIu64 " outages %" PRIu64 "\n# k due_us noticed_us (CLOCK_MONOTONIC)\n",
+                  self->steps, self->missed, self->outages);
     for (uint64_t i = 0U; (i < self->missed) && (i < MISSES_MAX); i++) {
         (void)fprintf(file, "%" PRIu32 " %" PRIu64 " %" PRIu64 "\n", misses[i].k, misses[i].due_us, misses[i].noticed_us);
     }

@@ -42,6 +42,7 @@ hg_status hg_e2e_p22_protect(uint8_t *data, uint8_t length, const uint8_t *data_
 void hg_e2e_receiver_start(hg_e2e_receiver *self)
 {
     self->counter = 0U;
+    self->crc = 0U;
     self->seen = false;
 }
 
@@ -55,12 +56,14 @@ hg_status hg_e2e_p22_receive(hg_e2e_receiver *self, const uint8_t *data, uint8_t
     }
     const uint8_t counter = data[1] & COUNTER_MASK;
     const uint8_t moved = (uint8_t)((counter - self->counter) & COUNTER_MASK);
-    if (self->seen && (moved == 0U)) {
+    if (self->seen && (moved == 0U) && (data[0] == self->crc)) {
         return HG_E_REPEATED;
     }
     header->stamp = data[1] >> 4U;
-    header->lost = self->seen ? (uint8_t)(moved - 1U) : 0U;
+    header->counter = counter;
+    header->lost = self->seen ? (uint8_t)((moved - 1U) & COUNTER_MASK) : 0U;
     self->counter = counter;
+    self->crc = data[0];
     self->seen = true;
     return HG_OK;
 }

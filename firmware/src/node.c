@@ -136,33 +136,50 @@ static void count_good(hg_link_health *health, const int32_t *code, uint8_t widt
     raise16(&health->invalid, invalid ? 1U : 0U);
 }
 
+/* What is known of the past belongs to nobody knows which samples any more: how old a held value is, and of which sample a frame already
+ * booked for the open one was. */
+static void forget_past(hg_node *self)
+{
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        hg_hold *hold = &self->detector.memory.hold[i];
+        (void)hg_hold_start(hold, hold->config, hold->sent);
+    }
+    hg_detector_restart(&self->detector, HG_START_MOVING);
+}
+
+/* Every sample has one closing frame: since the last one accepted, counter and sample index must have moved alike. */
+static bool in_step(const hg_node *self, const hg_e2e_header *header, uint8_t ahead)
+{
+    const uint8_t frames = (uint8_t)((header->counter - self->closing_counter) & COUNTER_MASK);
+    const uint8_t samples = (uint8_t)(((self->k + ahead) - self->closing_k) & COUNTER_MASK);
+    return (!self->closed) || (frames == samples);
+}
+
 /* The closing frame tells the time: steps become due. */
 static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_header *header)
 {
     const uint8_t width = self->config->message[self->config->closing].width;
     hg_link_health *health = &self->link[self->config->closing].health;
-    if (!self->synchronised) {
-        self->k += (header->stamp - self->k) & STAMP_MASK;
-        self->synchronised = true;
-    }
     uint8_t ahead = (uint8_t)((header->stamp - self->k) & STAMP_MASK);
-    if (ahead > STAMP_AHEAD_MAX) {
-        if (!self->slipped) {
-            self->slipped = true;
-            raise16(&health->late, 1U);
-            return HG_E_STAMP;
+    const bool anew = header->lost == HG_E2E_LOST;
+    if ((self->synchronised) && (ahead > STAMP_AHEAD_MAX) && (!self->slipped) && (!anew)) {
+        self->slipped = true;
+        raise16(&health->late, 1U);
+        return HG_E_STAMP;
+    }
+    if ((!self->synchronised) || (ahead > STAMP_AHEAD_MAX) || anew || (!in_step(self, header, ahead))) {
+        /* Late twice running, or a sender that began anew: this node has lost the sample index. Take the sender's. */
+        if (self->synchronised) {
+            forget_past(self);
         }
-        /* Late twice running: not one straggler, this node has lost the sample index. Take the sender's, and trust nothing of the past: how
-         * old a held value is, and of which sample a frame already booked for the open one was, nobody knows any more. */
         self->k += ahead;
         ahead = 0U;
-        for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
-            hg_hold *hold = &self->detector.memory.hold[i];
-            (void)hg_hold_start(hold, hold->config, hold->sent);
-        }
-        hg_detector_restart(&self->detector, HG_START_MOVING);
     }
+    self->synchronised = true;
     self->slipped = false;
+    self->closed = true;
+    self->closing_counter = header->counter;
+    self->closing_k = self->k + ahead;
     for (uint8_t g = 0U; g < width; g++) {
         self->closing[g] = code[g];
     }
@@ -177,7 +194,10 @@ static hg_status book(hg_node *self, uint8_t group, const int32_t *code, const h
 {
     hg_link_health *health = &self->link[group].health;
     const uint8_t ahead = (uint8_t)((header->stamp - self->k) & STAMP_MASK);
-    if ((ahead != 0U) || (!self->synchronised)) {
+    if (!self->synchronised) {
+        return HG_E_STAMP; /* of a sample that nobody can name yet: no fault of the sender's, and not counted */
+    }
+    if (ahead != 0U) {
         raise16((ahead > STAMP_AHEAD_MAX) ? &health->late : &health->early, 1U);
         return HG_E_STAMP;
     }
@@ -219,6 +239,19 @@ void hg_node_overdue(hg_node *self)
     if (self->due == 0U) {
         self->due = 1U;
     }
+}
+
+void hg_node_outage(hg_node *self)
+{
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        hg_e2e_receiver_start(&self->link[i].receiver); /* a counter that ran round meanwhile is no repetition */
+    }
+    forget_past(self);
+    self->due = 0U;
+    self->held = false;
+    self->slipped = false;
+    self->closed = false;
+    self->synchronised = false;
 }
 
 static uint16_t bus_of(const hg_node *self)

@@ -13,7 +13,7 @@ from hullguard.errors import HullguardError
 EPILOG = """a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
   NAME a signal or a fault of the model; KIND bias, drift (units a second), gain, freeze or noise; START and END sample indices
 
-exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened
+exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
 """
 
 
@@ -52,16 +52,16 @@ def _length(parser: argparse.ArgumentParser) -> None:
 
 
 def _positive(text: str) -> int:
-    value = int(text)
+    value = int(text) if text.lstrip("+-").isdigit() else 0
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} is not at least 1")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return value
 
 
 def _seed(text: str) -> int:
-    value = int(text)
+    value = int(text) if text.lstrip("+-").isdigit() else -1
     if not 0 <= value < 2**64:
-        raise argparse.ArgumentTypeError(f"{value} is not within 0 .. 2^64 - 1")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number within 0 .. 2^64 - 1")
     return value
 
 
@@ -136,7 +136,8 @@ def build_parser() -> argparse.ArgumentParser:
     _scenario(p)
     _length(p)
     _faults(p)
-    p.add_argument("--lockstep", action="store_true", help="wait for the node's verdict after every closing frame and compare it")
+    p.add_argument("--lockstep", action="store_true", help="wait for the node's verdict after every closing frame and compare it with this process's")
+    p.add_argument("--moving", action="store_true", help="the node was started without --rest")
     p.add_argument("--speed", default="1", metavar="X", help="multiple of real time (default 1)")
     _bus(p)
 

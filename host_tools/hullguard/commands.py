@@ -48,7 +48,7 @@ def prepared(args: argparse.Namespace) -> tuple[Model, Design]:
     model = load_model(args.model, overrides, getattr(args, "scenario", None))
     with progress(args, f"designing {model.name}") as tick:
         made, own = design(model, fresh=False, tick=tick)
-    if not own and not overrides and not store.path_of(model.path).exists():
+    if not own and not overrides and not model.scenario(getattr(args, "scenario", None)).set and store.read(store.path_of(model.path)) is None:
         _keep_design(args, model, made)
     return made.model, made
 
@@ -393,7 +393,7 @@ def run_plant(args: argparse.Namespace) -> int:
     options = bus_options(args) or {"interface": "socketcan", "channel": choose.existing_vcan() or "vcan0"}
     pace = Pace(args.lockstep, _speed(args.speed))
     with opened(**options) as link:
-        run = Run(made, native, OnCan(link, native, pace), pace)
+        run = Run(made, native, OnCan(link, native, pace), pace, start=MOVING if args.moving else REST)
         trace = run.samples(source, samples)
     result = summary(made, native, trace, faults, {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name})
     _tell(args, result)
@@ -434,14 +434,15 @@ def run_detect(args: argparse.Namespace) -> int:
 
     start = REST if args.rest else MOVING
     if args.log:
-        detector = Detector(native, start, False, None, watch)
-        from_log(detector, candump.read(Path(args.log)))
+        detector = Detector(native, start, False, None, watch, made.model.sample_time_s)
+        from_log(detector, candump.read(Path(args.log)), args.samples or 0)
     else:
         options = bus_options(args)
         if not options:
             raise InputError("detect needs a bus (-i INTERFACE -c CHANNEL) or a log (--log FILE)")
         with signalled() as stopped, opened(**options) as link:
-            detector = Detector(native, start, args.lockstep, None if args.listen else link.send, watch)
+            period = None if args.lockstep else made.model.sample_time_s
+            detector = Detector(native, start, args.lockstep, None if args.listen else link.send, watch, period)
             if args.ready:
                 print("ready", flush=True)
             from_bus(detector, link, made.model.sample_time_s, not args.lockstep, args.samples or 0, stopped)

@@ -243,6 +243,32 @@ def test_frames_of_strangers_change_nothing() -> None:
     assert all(row["refused"] == row["lost"] == 0 for row in health(n).values())
 
 
+def test_a_stopped_node_is_no_plant_fault() -> None:
+    """Stopped while 16 samples pass unsent: to their stamps nothing has happened, and only the clock tells that much has."""
+    period_s, at, samples = 0.03, range(60, 300, 60), 460
+    drive = Drive("platoon", "manoeuvres", (f"controller2:bias:3@{samples - 100}",))
+    got: list[Frame] = []
+    with link() as bus, node("--rest", "--status", "--period", period_s * 1000) as n:
+        for k in range(samples):
+            if k in at:
+                n.popen.send_signal(signal.SIGSTOP)
+                for _ in range(16):
+                    drive.sample()
+                time.sleep(16 * period_s)
+            frames, tick = drive.sample()
+            for f in [*frames, tick]:
+                bus.send(f)
+            if k in at:
+                n.popen.send_signal(signal.SIGCONT)
+            while (told := bus.receive(0.001)) is not None:
+                got.append(told[0])
+        n.stop()
+    confirmed = [v.k for v in (drive.told(f) for f in got if f.id == drive.verdict_id) if v.plant == "confirmed"]
+    assert n.status == 0 and f" outages={len(at)} " in n.lines[-1]
+    # The node's samples lag: what it never heard of, and 16 at a time, it has not counted.
+    assert confirmed and confirmed[0] >= samples - 100 - 16 * len(at), f"a fault is found, and none before it: {confirmed[:1]}"
+
+
 # ---- together ----
 
 

@@ -133,6 +133,22 @@ static void every_step_of_the_counter_is_told(void **state)
     }
 }
 
+static void another_frame_with_the_same_counter_is_no_repetition(void **state)
+{
+    (void)state;
+    for (uint8_t counter = 0U; counter < 16U; counter++) {
+        hg_e2e_receiver self;
+        hg_e2e_header header;
+        hg_e2e_receiver_start(&self);
+        assert_status(HG_OK, receive(&self, counter, 1U, &header));
+        assert_status(HG_OK, receive(&self, counter, 2U, &header)); /* 15 were lost, or the sender began anew */
+        assert_int_equal(HG_E2E_LOST, header.lost);
+        assert_int_equal(2, header.stamp);
+        assert_int_equal(counter, header.counter);
+        assert_status(HG_E_REPEATED, receive(&self, counter, 2U, &header));
+    }
+}
+
 static void a_repeated_counter_changes_nothing(void **state)
 {
     (void)state;
@@ -142,7 +158,7 @@ static void a_repeated_counter_changes_nothing(void **state)
         hg_e2e_receiver_start(&self);
         assert_status(HG_OK, receive(&self, counter, 1U, &header));
         header = (hg_e2e_header){.stamp = 0x5AU, .lost = 0x5AU};
-        assert_status(HG_E_REPEATED, receive(&self, counter, 2U, &header));
+        assert_status(HG_E_REPEATED, receive(&self, counter, 1U, &header));
         assert_int_equal(0x5A, header.stamp);
         assert_int_equal(0x5A, header.lost);
         assert_int_equal(counter, self.counter);
@@ -273,6 +289,7 @@ int main(void)
         cmocka_unit_test(protect_writes_two_bytes_and_no_more),
         cmocka_unit_test(a_length_out_of_range_is_refused_and_nothing_written),
         cmocka_unit_test(every_step_of_the_counter_is_told),
+        cmocka_unit_test(another_frame_with_the_same_counter_is_no_repetition),
         cmocka_unit_test(a_repeated_counter_changes_nothing),
         cmocka_unit_test(the_counter_runs_round_without_a_loss),
         cmocka_unit_test(two_receivers_do_not_know_of_each_other),

@@ -478,18 +478,51 @@ static void one_late_tick_is_a_straggler(void **state)
 {
     (void)state;
     static rig r;
-    begin(&r, HG_START_REST);
-    for (uint32_t k = 0U; k < 3U; k++) {
-        sample(&r, k, 0, 0, 0);
+    begin(&r, HG_START_MOVING);
+    for (uint32_t k = 0U; k < 5U; k++) {
+        assert_status((k == 0U) ? HG_E_STAMP : HG_OK, give(&r, 0U, k, 640, 640));
+        assert_status(HG_OK, give(&r, 1U, k, 640, 0));
+        step(&r, k);
     }
-    for (uint32_t i = 0U; i < 5U; i++) {
-        assert_status(HG_E_STAMP, give(&r, 1U, 2U + i, 0, 0));
+    for (uint16_t i = 0U; i < 20U; i++) {
+        const uint32_t k = 5U + (2U * (uint32_t)i);
+        const hg_can_frame tick = frame_of(&r, 1U, k, 640, 0);
+        assert_status(HG_OK, give(&r, 0U, k, 640, 640));
+        hg_node_overdue(&r.self);
+        step(&r, k);
+        assert_int_equal(HG_PLANT_NONE, r.verdict.plant);
+        assert_status(HG_E_STAMP, hg_node_receive(&r.self, &tick)); /* its sample is closed already */
         nothing_is_due(&r);
-        sample(&r, 3U + i, 0, 0, 0);
+        assert_int_equal(i + 1U, hg_node_health(&r.self, 1U)->late);
+        assert_status(HG_E_REPEATED, hg_node_receive(&r.self, &tick));
+        sample(&r, k + 1U, 640, 640, 640);
+        assert_int_equal(HG_PLANT_NONE, r.verdict.plant); /* a restart in a moving plant would be starting */
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
         assert_int_equal(HG_BUS_LOSSY, bus(&r, 1U));
     }
-    assert_int_equal(5, hg_node_health(&r.self, 1U)->late);
-    assert_count(0, r.self.overdue);
+    assert_count(20, r.self.overdue);
+}
+
+/* The counter of the last tick accepted is what counts, whatever has been refused since. */
+static void old_ticks_between_leave_the_others_in_step(void **state)
+{
+    (void)state;
+    for (uint8_t back = 1U; back <= 7U; back++) {
+        static rig r;
+        begin(&r, HG_START_MOVING);
+        for (uint32_t k = 0U; k < 40U; k++) {
+            r.counter[1] = (uint8_t)(r.counter[1] - 1U - back);
+            hg_can_frame old = frame_of(&r, 1U, k - 1U - back, 0, 0);
+            r.counter[1] = (uint8_t)(r.counter[1] + back);
+            if ((k >= 20U) && ((k % 2U) == 0U)) {
+                assert_status(HG_E_STAMP, hg_node_receive(&r.self, &old));
+            }
+            assert_status(HG_OK, give(&r, 1U, k, 0, 0));
+            step(&r, k);
+            assert_int_equal((k < 2U) ? HG_PLANT_STARTING : HG_PLANT_NONE, r.verdict.plant);
+        }
+        assert_int_equal(10, hg_node_health(&r.self, 1U)->late);
+    }
 }
 
 static void two_late_ticks_restart_with_nothing_known(void **state)
@@ -513,7 +546,7 @@ static void two_late_ticks_restart_with_nothing_known(void **state)
         assert_real(SM_SPAN, r.self.detector.radius[1]);
         assert_real(SM_HALF, r.self.detector.radius[2]);
         assert_int_equal(HG_BUS_ABSENT, bus(&r, 0U));
-        assert_int_equal(2, hg_node_health(&r.self, 1U)->late);
+        assert_int_equal(1, hg_node_health(&r.self, 1U)->late); /* the second one was not refused */
         sample(&r, 6U + ahead, 0, 0, 0);
         assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
         assert_int_equal(HG_BUS_GOOD, bus(&r, 1U));
@@ -531,8 +564,8 @@ static void a_moving_start_waits_for_the_sample_index(void **state)
         begin(&r, HG_START_MOVING);
         assert_status(HG_E_STAMP, give(&r, 0U, 0U, 5, 5)); /* even with the stamp of the sample that happens to be open */
         assert_status(HG_E_STAMP, give(&r, 0U, 9U, 5, 5));
-        assert_int_equal(1, hg_node_health(&r.self, 0U)->early);
-        assert_int_equal(1, hg_node_health(&r.self, 0U)->late);
+        assert_int_equal(0, hg_node_health(&r.self, 0U)->early); /* nobody can say of which sample they are */
+        assert_int_equal(0, hg_node_health(&r.self, 0U)->late);
         nothing_is_due(&r);
         assert_status(HG_OK, give(&r, 1U, stamp, 5, 0));
         step(&r, stamp);
@@ -685,47 +718,221 @@ static void two_nodes_share_tables_and_nothing_else(void **state)
     }
 }
 
+/* A healthy plant that moves within its bounds, and its senders. */
+typedef struct {
+    uint32_t  random;
+    double    s1;
+    double    s2;
+    double    slope;
+    hg_sender sender[SM_GROUPS];
+    int32_t   codes[SM_GROUPS][4];
+} plant;
+
+static void plant_senders(plant *p)
+{
+    static const hg_sender_config config[SM_GROUPS] = {{.message = &messages[0], .trigger = &sm_trigger_a},
+                                                       {.message = &messages[1], .trigger = &sm_trigger_b}};
+    for (size_t i = 0U; i < SM_GROUPS; i++) {
+        assert_status(HG_OK, hg_sender_start(&p->sender[i], &config[i], p->codes[i]));
+    }
+}
+
+static void plant_begin(plant *p, uint32_t seed)
+{
+    *p = (plant){.random = seed, .s1 = 3.0, .s2 = -2.0};
+    plant_senders(p);
+}
+
+/* The next sample; value[0] is what group 0 sends, value[1] what group 1 does. */
+static void plant_move(plant *p, bool fault, hg_real value[SM_GROUPS][2])
+{
+    p->slope = ((draw(&p->random) % 15U) == 0U) ? ((double)draw_between(&p->random, -3, 3) * 0.0625) : p->slope;
+    p->s2 += (fabs(p->s2 + p->slope) < 40.0) ? p->slope : 0.0;
+    const double move = (double)draw_between(&p->random, -16, 16) / 64.0;
+    p->s1 += (fabs(p->s1 + move) < 40.0) ? move : 0.0;
+    const double d = (double)draw_between(&p->random, -15, 15) / 1024.0;
+    value[0][0] = R(p->s2 + d + (fault ? 4.0 : 0.0));
+    value[0][1] = R(p->s1);
+    value[1][0] = R(p->s2);
+}
+
+/* One sample over a link that loses nothing, or everything; the status of the closing frame. */
+static hg_status plant_sample(plant *p, rig *r, uint32_t k, bool fault, bool sent)
+{
+    hg_real value[SM_GROUPS][2];
+    hg_status status = HG_E_EMPTY;
+    plant_move(p, fault, value);
+    for (uint8_t group = 0U; group < SM_GROUPS; group++) {
+        hg_can_frame frame;
+        if ((hg_sender_step(&p->sender[group], k, value[group], &frame) == HG_OK) && sent) {
+            status = hg_node_receive(&r->self, &frame);
+        }
+    }
+    return status;
+}
+
+/* The steps that are due, and whether one of them confirmed an alarm. */
+static bool confirms(rig *r)
+{
+    bool confirmed = false;
+    while (hg_node_step(&r->self, &r->verdict) == HG_OK) {
+        sm_check_canaries(&r->storage);
+        confirmed = confirmed || (r->verdict.plant == HG_PLANT_CONFIRMED);
+    }
+    return confirmed;
+}
+
+static void nothing_is_known_but_the_closing_frame(const rig *r)
+{
+    assert_int_equal(HG_PLANT_STARTING, r->verdict.plant);
+    assert_int_equal(HG_BUS_ABSENT, bus(r, 0U));
+    assert_int_equal(HG_BUS_GOOD, bus(r, 1U));
+    assert_real(SM_SPAN, r->self.detector.radius[0]);
+    assert_real(SM_SPAN, r->self.detector.radius[1]);
+    assert_real(SM_HALF, r->self.detector.radius[2]);
+}
+
+/* A sender whose index leaps while its counter goes on, or that begins anew at 0 with both. The plant goes on in either case. */
+static void a_leap(uint32_t seed, uint32_t leap, int32_t by, bool anew)
+{
+    static rig r;
+    plant p;
+    uint32_t k = 5U; /* not in phase with the counter: a sender that begins anew has moved one against the other */
+    uint32_t wait = 0U;
+    bool found = false;
+    begin(&r, HG_START_MOVING);
+    plant_begin(&p, seed);
+    for (uint32_t i = 0U; i < 160U; i++, k++) {
+        if (i == leap) {
+            k = anew ? 0U : (uint32_t)((int32_t)k + by);
+            wait = 4U;
+        }
+        if ((i == leap) && anew) {
+            plant_senders(&p);
+        }
+        const bool fault = i >= 140U;
+        const hg_status status = plant_sample(&p, &r, k, fault, true);
+        const bool confirmed = confirms(&r);
+        assert_false(confirmed && (!fault));
+        found = found || confirmed;
+        if ((wait > 0U) && (status == HG_OK) && (r.verdict.plant == HG_PLANT_STARTING)) {
+            nothing_is_known_but_the_closing_frame(&r);
+            assert_count(k & 15U, r.verdict.k & 15U);
+            wait = 0U;
+        }
+        assert_true(wait != 1U); /* the third closing frame at the latest */
+        wait -= (wait > 0U) ? 1U : 0U;
+    }
+    assert_true(found);
+}
+
+static void a_sender_that_leaps_or_begins_anew_restarts_the_detector(void **state)
+{
+    (void)state;
+    const uint32_t seed = seed_of_run(91U);
+    for (uint32_t i = 0U; i < 320U; i++) {
+        const uint32_t leap = 60U + (i % 16U);
+        a_leap(seed + i, leap, -1, false);
+        a_leap(seed + i, leap, (int32_t)(1U + (i % 15U)), false);
+        a_leap(seed + i, leap, 0, true);
+    }
+}
+
+static void an_outage_that_is_told_is_no_plant_fault(void **state)
+{
+    (void)state;
+    const uint32_t seed = seed_of_run(95U);
+    for (uint32_t i = 0U; i < 330U; i++) {
+        static rig r;
+        plant p;
+        const uint32_t first = 50U + (i / 33U);
+        const uint32_t last = first + 8U + (i % 33U); /* the first sample after 8 .. 40 lost ones */
+        bool found = false;
+        begin(&r, ((i & 1U) != 0U) ? HG_START_REST : HG_START_MOVING);
+        plant_begin(&p, seed + i);
+        for (uint32_t k = 0U; k < 160U; k++) {
+            const bool fault = k >= 140U;
+            const bool sent = (k < first) || (k >= last);
+            if (k == last) {
+                hg_node_outage(&r.self);
+            }
+            const hg_status status = plant_sample(&p, &r, k, fault, sent);
+            const uint32_t steps = r.self.due;
+            const bool confirmed = confirms(&r);
+            assert_false(confirmed && (!fault));
+            found = found || confirmed;
+            assert_status(sent ? HG_OK : HG_E_EMPTY, status);
+            assert_count(sent ? 1U : 0U, steps);
+            assert_true((!sent) || ((r.verdict.k & 15U) == (k & 15U)));
+            if (k == last) {
+                nothing_is_known_but_the_closing_frame(&r);
+            }
+        }
+        assert_true(found);
+        assert_count(0, r.self.overdue);
+        for (uint8_t group = 0U; group < SM_GROUPS; group++) {
+            const hg_link_health *health = hg_node_health(&r.self, group);
+            assert_int_equal(0, health->lost + health->repeated + health->early + health->late);
+        }
+    }
+}
+
+static void an_outage_drops_the_steps_that_are_due(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    sample(&r, 0U, 640, 640, 640);
+    r.counter[1] = (uint8_t)(r.counter[1] + 3U);
+    assert_status(HG_OK, give(&r, 1U, 4U, 640, 0)); /* 1 .. 4 */
+    step(&r, 1U);
+    hg_node_outage(&r.self);
+    nothing_is_due(&r);
+    hg_node_outage(&r.self); /* said twice is said once */
+    assert_status(HG_E_STAMP, give(&r, 0U, 2U, 640, 640)); /* the open sample's, but who knows */
+    assert_int_equal(0, hg_node_health(&r.self, 0U)->early + hg_node_health(&r.self, 0U)->late);
+    hg_node_overdue(&r.self); /* a bus that stays silent is told all the same */
+    step(&r, 2U);
+    assert_int_equal(HG_PLANT_STARTING, r.verdict.plant);
+    assert_int_equal(HG_BUS_ABSENT, bus(&r, 0U));
+    assert_int_equal(HG_BUS_ABSENT, bus(&r, 1U));
+    assert_real(SM_SPAN, r.self.detector.radius[2]); /* the closing frame that was held is forgotten */
+    assert_status(HG_OK, give(&r, 1U, 17U, 640, 0)); /* 14 ahead: any step is possible */
+    step(&r, 17U);
+    nothing_is_due(&r);
+    nothing_is_known_but_the_closing_frame(&r);
+    hg_node_overdue(&r.self);
+    hg_node_outage(&r.self);
+    nothing_is_due(&r);
+}
+
 /* The link does what links do: it drops, damages, doubles and delays frames, closing frames too, some for longer than a stamp can tell
  * forward from back. The plant keeps its bounds until a fault comes, and before that no alarm may ever be confirmed. */
 static void abuse(uint32_t seed, bool deadline, unsigned restarts[1], unsigned provisional[1])
 {
     static rig r;
-    uint32_t random = seed;
-    hg_sender sender[SM_GROUPS];
-    int32_t codes[SM_GROUPS][4];
-    const hg_sender_config config[SM_GROUPS] = {{.message = &messages[0], .trigger = &sm_trigger_a},
-                                                {.message = &messages[1], .trigger = &sm_trigger_b}};
-    double s1 = 3.0;
-    double s2 = -2.0;
-    double slope = 0.0;
+    plant p;
     int32_t outage = 0;
     unsigned missed = 0U;
     unsigned certain = 0U;
     bool confirmed = false;
     hg_can_frame straggler = {.id = 0x7FFU};
     begin(&r, ((seed & 1U) != 0U) ? HG_START_REST : HG_START_MOVING);
-    for (size_t i = 0U; i < SM_GROUPS; i++) {
-        assert_status(HG_OK, hg_sender_start(&sender[i], &config[i], codes[i]));
-    }
+    plant_begin(&p, seed);
     for (uint32_t k = 0U; k < 700U; k++) {
         const bool fault = k >= 600U;
-        slope = ((draw(&random) % 15U) == 0U) ? ((double)draw_between(&random, -3, 3) * 0.0625) : slope;
-        s2 += (fabs(s2 + slope) < 40.0) ? slope : 0.0;
-        const double move = (double)draw_between(&random, -16, 16) / 64.0;
-        s1 += (fabs(s1 + move) < 40.0) ? move : 0.0;
-        const double d = (double)draw_between(&random, -15, 15) / 1024.0;
-        const hg_real a[2] = {R(s2 + d + (fault ? 4.0 : 0.0)), R(s1)};
-        const hg_real b[1] = {R(s2)};
-        if (((draw(&random) % 60U) == 0U) && (!fault)) {
-            outage = draw_between(&random, 1, 12);
+        hg_real value[SM_GROUPS][2];
+        plant_move(&p, fault, value);
+        if (((draw(&p.random) % 60U) == 0U) && (!fault)) {
+            outage = draw_between(&p.random, 1, 12);
         }
         outage -= (outage > 0) ? 1 : 0;
         for (uint8_t group = 0U; group < SM_GROUPS; group++) {
             hg_can_frame frame;
-            if (hg_sender_step(&sender[group], k, (group == 0U) ? a : b, &frame) != HG_OK) {
+            if (hg_sender_step(&p.sender[group], k, value[group], &frame) != HG_OK) {
                 continue;
             }
-            int32_t fate = draw_between(&random, 0, 99);
+            int32_t fate = draw_between(&p.random, 0, 99);
             if (group == 1U) {
                 /* 16 closing frames lost in a row are no outage by their stamps, only a deadline sees it (node.h): two come before */
                 if ((missed >= 11U) && (!deadline)) {
@@ -741,7 +948,7 @@ static void abuse(uint32_t seed, bool deadline, unsigned restarts[1], unsigned p
             if ((fate < 4) || ((outage > 0) && ((group == 1U) || (fate < 30)))) {
                 /* lost */
             } else if (fate < 8) {
-                frame.data[draw(&random) % frame.length] ^= 0x40U;
+                frame.data[draw(&p.random) % frame.length] ^= 0x40U;
                 assert_status(HG_E_CRC, hg_node_receive(&r.self, &frame));
             } else if ((fate < 12) && (group == 0U)) {
                 straggler = frame;
@@ -1069,6 +1276,7 @@ int main(void)
         cmocka_unit_test(lost_frames_are_counted_by_the_sequence),
         cmocka_unit_test(a_missing_tick_is_a_step),
         cmocka_unit_test(one_late_tick_is_a_straggler),
+        cmocka_unit_test(old_ticks_between_leave_the_others_in_step),
         cmocka_unit_test(two_late_ticks_restart_with_nothing_known),
         cmocka_unit_test(a_moving_start_waits_for_the_sample_index),
         cmocka_unit_test(the_sample_index_never_goes_back),
@@ -1077,6 +1285,9 @@ int main(void)
         cmocka_unit_test(a_code_that_only_the_message_allows_is_refused),
         cmocka_unit_test(health_counters_saturate),
         cmocka_unit_test(two_nodes_share_tables_and_nothing_else),
+        cmocka_unit_test(a_sender_that_leaps_or_begins_anew_restarts_the_detector),
+        cmocka_unit_test(an_outage_that_is_told_is_no_plant_fault),
+        cmocka_unit_test(an_outage_drops_the_steps_that_are_due),
         cmocka_unit_test(no_alarm_is_confirmed_without_a_fault_whatever_the_link_does),
         cmocka_unit_test(the_first_verdict_is_told_with_the_status),
         cmocka_unit_test(the_verdict_frame_has_the_documented_bytes),

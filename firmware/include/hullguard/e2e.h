@@ -15,6 +15,7 @@
 
 #define HG_E2E_P22_HEADER 2U   /* bytes before the signals */
 #define HG_E2E_P22_LENGTH 32U  /* longest protected frame, bytes */
+#define HG_E2E_LOST 15U        /* more frames lost than the counter tells */
 #define HG_E2E_IDS 16U         /* data identifiers, one a counter value */
 
 /** Checksum of a whole frame, its byte 0 left out.
@@ -30,13 +31,16 @@ hg_status hg_e2e_p22_protect(uint8_t *data, uint8_t length, const uint8_t *data_
 
 typedef struct {      /* RAM: one a received message */
     uint8_t counter;  /* of the last good frame */
+    uint8_t crc;      /* its checksum */
     bool    seen;     /* has there been one? */
 } hg_e2e_receiver;
 
 /** What a good frame's header says. */
 typedef struct {
     uint8_t stamp;    /* sample modulo 16 */
-    uint8_t lost;     /* frames lost before this one by the counter, 0 .. 14; 0 for the first frame. 15 lost in a row read as a repetition */
+    uint8_t counter;  /* 0 .. 15 */
+    uint8_t lost;     /* frames lost before this one by the counter, 0 .. 14; 0 for the first frame; HG_E2E_LOST for a counter that has not
+                       * moved although the frame is another: 15 frames were lost, or the sender began anew */
 } hg_e2e_header;
 
 /** No frame seen yet. */
@@ -46,7 +50,7 @@ void hg_e2e_receiver_start(hg_e2e_receiver *self);
  *  @retval HG_OK          *header is valid
  *  @retval HG_E_FORMAT    length out of range; nothing changed
  *  @retval HG_E_CRC       damaged; nothing changed
- *  @retval HG_E_REPEATED  the counter has not moved since the last good frame; nothing changed */
+ *  @retval HG_E_REPEATED  the last good frame once more: counter and checksum are the same; nothing changed */
 hg_status hg_e2e_p22_receive(hg_e2e_receiver *self, const uint8_t *data, uint8_t length, const uint8_t *data_id, hg_e2e_header *header);
 
 #endif

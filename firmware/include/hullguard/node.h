@@ -8,8 +8,10 @@
  *
  *  Stamps. Every frame carries k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated as
  *  lost, never booked to the wrong sample. A closing frame j <= 7 ahead makes j steps without it first; a late one is counted, and two running
- *  restart the detector at the sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing
- *  frames lost in a row are an outage that only hg_node_overdue() sees.
+ *  restart the detector at the sender's sample with nothing known of any group; so does one whose counter has not moved with its sample,
+ *  which is of a sender that began anew. The sample index never goes back. More than 7 closing frames lost in a row read as fewer, or as
+ *  none: the application, which has a clock, must have called hg_node_overdue() for each, or call hg_node_outage(). Otherwise an alarm
+ *  after such an outage may be false.
  *  Not reentrant per instance. hg_inbox is the one structure that an interrupt may share with the main loop. */
 #ifndef HULLGUARD_NODE_H
 #define HULLGUARD_NODE_H
@@ -99,6 +101,9 @@ typedef struct {                /* RAM: one a node */
     bool            continues;  /* and its sequence counter continued */
     bool            synchronised; /* has a closing frame told which sample is open? */
     bool            slipped;    /* the last closing frame was late */
+    bool            closed;     /* has a closing frame been accepted? */
+    uint8_t         closing_counter; /* the last accepted one's sequence counter */
+    uint32_t        closing_k;  /* and its sample */
     bool            reported;   /* has a verdict frame been handed out? */
     uint16_t        silence;    /* samples since the last heartbeat */
     hg_verdict      last;       /* the last one of those */
@@ -132,6 +137,11 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame);
 
 /** The open sample's closing frame has not come in time: the sample is closed without it. */
 void hg_node_overdue(hg_node *self);
+
+/** More closing frames may have been missed than the stamp can tell, which is 7: the process was stopped, or frames were dropped on the way.
+ *  The application sees it by the time between two closing frames. The detector forgets all it holds and begins again, anywhere in the
+ *  plant's range, with the sample of the next closing frame. Steps that are due are dropped. Cost: a pass over the real memory. */
+void hg_node_outage(hg_node *self);
 
 /** Make one step that is due.
  *  @retval HG_OK       *verdict is of the sample just closed

@@ -91,7 +91,12 @@ def opened(**options: Any) -> Iterator[CanLink]:
         bus = can.Bus(**options)
     except (can.CanError, can.CanInterfaceNotImplementedError, OSError, ValueError, ImportError, TypeError) as error:
         channel = options.get("channel")
-        cure = f"create it with: ip link add dev {channel} type vcan && ip link set {channel} up" if options.get("interface") == "socketcan" else "check -i, -c and its driver"
+        if options.get("interface") != "socketcan":
+            cure = "check -i, -c and its driver"
+        elif isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
+            cure = "this kernel has no CAN: use --bus auto or --bus inprocess, or run it under build/with-vcan/with-vcan"
+        else:
+            cure = f"create it with: ip link add {channel} type vcan && ip link set {channel} up"
         raise BusError(f"bus {name} cannot be opened: {error}; {cure}") from error
     link = CanLink(bus)
     try:

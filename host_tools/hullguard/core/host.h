@@ -59,12 +59,13 @@ typedef struct {
     double  amplitude; /* input units; each input's reference bound limits it */
 } hgh_reference;
 
-typedef struct {                        /* x+ = A x + B u + Ed d, y = C x + D u + Fd d, u = -gain (x - equilibrium) + reference */
+typedef struct {                        /* x+ = A x + B u + Ed d, y = C x + D u + Fd d, u = held - gain (x - equilibrium) + reference */
     int32_t              n, m, p, nd, signals;
     const double        *A, *B, *C, *D, *Ed, *Fd;
     const double        *gain;          /* [p][n] or null: u is the reference alone */
     const double        *reference_bound; /* [p] */
     const double        *equilibrium;   /* [n] */
+    const double        *held;          /* [p] input that holds it there */
     const double        *initial_range; /* [n] */
     const int32_t       *output;        /* [m] places of y in the signal vector */
     const int32_t       *input;         /* [p] places of u */

@@ -198,6 +198,10 @@ class Node:
         """The closing frame has not come in time."""
         self._lib.hg_node_overdue(self.node)
 
+    def outage(self) -> None:
+        """More samples may have been missed than their stamps can tell."""
+        self._lib.hg_node_outage(self.node)
+
     def step(self) -> Verdict | None:
         """Make one step that is due; None when there is none."""
         if self._lib.hg_node_step(self.node, self._verdict) != self._lib.HG_OK:
@@ -329,6 +333,7 @@ class PlantConfig:
         else:
             bound = np.array([min(-model.signals[i].low, model.signals[i].high) for i in model.inputs])
             c.reference_bound = doubles(np.maximum(bound, 0.0))
+        c.held = doubles(plant.equilibrium_input)
         c.equilibrium, c.initial_range = doubles(plant.equilibrium), doubles(plant.initial_range)
         c.output, c.input = ints(model.outputs), ints(model.inputs)
         group_of = {i: (g, gi) for gi, g in enumerate(model.groups) for i in g.signals}

@@ -134,7 +134,7 @@ static double row(const double *matrix, int32_t i, int32_t cols, const double *x
 static double command(hgh_plant *self, int32_t i)
 {
     const hgh_plant_config *c = self->config;
-    double u = fmin(self->reference.amplitude, c->reference_bound[i]) * drive(self, i);
+    double u = c->held[i] + fmin(self->reference.amplitude, c->reference_bound[i]) * drive(self, i);
     if (c->gain != NULL) {
         for (int32_t j = 0; j < c->n; j++) {
             u -= c->gain[i * c->n + j] * (self->x[j] - c->equilibrium[j]);

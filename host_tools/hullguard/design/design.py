@@ -182,9 +182,8 @@ def _fits(model: Model, old: Stored) -> bool:
 
 def stored_for(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
     """The stored numbers of a model, and whether they are the file's own. A search is made only where the file does not help."""
-    path = store.path_of(model.path)
-    if path.exists() and not fresh:
-        old = store.read(path)
+    old = None if fresh else store.read(store.path_of(model.path))
+    if old is not None:
         if old.model_sha256 == model.sha256:
             return old, True
         if _fits(model, old):
@@ -225,8 +224,7 @@ def _largest(model: Model, stored: Stored, place: int) -> float:
     reached = float(stored.signal_reach[place])
     if not np.isfinite(reached):
         return declared
-    centre = abs(float(model.plant.C[model.outputs.index(place)] @ model.plant.equilibrium)) if place in model.outputs else 0.0
-    return min(declared, reached + centre + s.resolution)
+    return min(declared, reached + abs(model.centre(place)) + s.resolution)
 
 
 def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator:
@@ -294,16 +292,10 @@ def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, ge
     checks = []
     for i, s in enumerate(model.signals):
         if np.isfinite(stored.signal_reach[i]):
-            offset = abs(float(model.plant.C[model.outputs.index(i)] @ model.plant.equilibrium)) if i in model.outputs else 0.0
-            limit = min(-s.low, s.high) if s.low < 0 < s.high else max(abs(s.low), abs(s.high))
-            checks.append(
-                Check(
-                    f"reach of {s.name}",
-                    float(stored.signal_reach[i]) + offset,
-                    limit,
-                    f"widen its range to at least {stored.signal_reach[i] + offset:.3g}, or bound the reference more tightly",
-                )
-            )
+            reached, centre = float(stored.signal_reach[i]), model.centre(i)
+            low, high = centre - reached, centre + reached
+            cure = f"make its range {low:.3g} .. {high:.3g} or wider, or bound the reference more tightly"
+            checks.append(Check(f"reach of {s.name} beyond its range", max(s.low - low, high - s.high), 0.0, cure))
     checks.append(Check("bus load, worst case", bound, model.load_max, "raise bitrate_bps, the trigger's silence or the sample time"))
     for i, g in enumerate(generators):
         share = float((g.tables.rounding / g.tables.steady).max())

@@ -10,6 +10,7 @@ Every bound is rounded up to float32 and widened by what adding it up in float32
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,10 @@ from hullguard.errors import InputError
 from hullguard.model.table import Array
 
 TAPS_MAX = 200
+SMALLEST_DECAY = 1e-6  # of a generator that forgets all in finite time
 SETTLE_MAX = 2000
 LAGS_MAX = 400  # over which the growth of rounding is followed
-TAIL_SHARE = 0.002  # of the threshold: what may lie behind the taps
+TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add
 BIAS_SHARE = 0.001  # of the threshold: what the last row of the bias tables may be above its limit
 READY_SHARE = 0.10  # of the threshold: what the initial state may still be when a detector is no longer starting
 
@@ -102,30 +104,52 @@ def _rounding(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array,
     return Rounding(into_e[:, 0], into_r[:, 0], gamma * weight, gamma * mul(weight[-1], 2 * v)[:, 0] * lags)
 
 
-def _tail(lin: Linear, taps: int) -> tuple[float, Array, Array]:
-    """decay, tail_input, tail_output with |F G^(j-1) E| <= tail_output decay^(j-taps) tail_input for all j >= taps."""
-    bounds = []
+@dataclass(frozen=True)
+class Tail:
+    """|F G^(j-1) E| <= output(taps) decay^(j-taps) input for all j >= taps, for every number of taps."""
+
+    decay: float
+    input: Array  # width
+    output: Callable[[int], Array]  # taps -> residuals
+
+
+def _tail(lin: Linear) -> Tail:
+    """The bound of what lies behind the taps: by eigenvectors where there are enough of them, else by a power of G that contracts."""
     values, vectors = np.linalg.eig(lin.state)
     # A double eigenvalue can come with columns that are no eigenvectors and yet do not look singular: both are checked.
     off = np.abs(lin.state @ vectors - vectors * values).max()
     if np.linalg.cond(vectors) < 1e6 and off < 1e-12 * (1 + np.abs(lin.state).max()):
-        decay = float(np.abs(values).max())
         into = np.abs(np.linalg.solve(vectors, lin.input.astype(complex))).max(0)
-        out = np.abs(lin.output @ vectors) @ np.abs(values) ** (taps - 1)
-        bounds.append((max(decay, 1e-6), into, out))
-    # Any stable matrix: with |G^q| = c < 1 every row of F G^(i + q n) is at most |F G^i| c^n.
-    F = powers(lin.output, lin.state, taps + 4096)
-    q = next((q for q in (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048) if np.abs(np.linalg.matrix_power(lin.state, q)).sum(1).max() < 0.9), None)
-    if q is not None:
-        c = float(np.abs(np.linalg.matrix_power(lin.state, q)).sum(1).max())
-        decay = c ** (1 / q)
-        rows = np.abs(F[taps - 1 : taps - 1 + q]).sum(2)
-        bounds.append((max(decay, 1e-6), np.abs(lin.input).max(0), (rows * (max(decay, 1e-6) ** -np.arange(q))[:, None]).max(0)))
-    if not bounds:
+        out = np.abs(lin.output @ vectors)
+        return _rounded_tail(float(np.abs(values).max()), into, lambda taps: np.asarray(out @ np.abs(values) ** (taps - 1)))
+    # With |G^q| = c < 1 every row of F G^(i + q n) is at most |F G^i| c^n.
+    q = next((2**n for n in range(12) if np.abs(np.linalg.matrix_power(lin.state, 2**n)).sum(1).max() < 0.9), None)
+    if q is None:
         raise InputError("the generator decays too slowly for a threshold: choose poles further inside the unit circle")
-    decay, into, out = min(bounds, key=lambda b: float(b[1].max() * b[2].max() / max(1 - b[0], 1e-9)))
-    scale = 1 + 1e-6  # above what eigenvectors can be off; the digits make the result the same on every processor
-    return float(up32(digits(np.array(min(decay * scale + 1e-9, 1 - 1e-7)), 7))), up32(digits(into * scale, 7)), up32(digits(out * scale, 7))
+    decay = max(float(np.abs(np.linalg.matrix_power(lin.state, q)).sum(1).max()) ** (1 / q), SMALLEST_DECAY)
+
+    def rows(taps: int) -> Array:
+        F = powers(mul(lin.output, np.linalg.matrix_power(lin.state, taps - 1)), lin.state, q)
+        return np.asarray((np.abs(F).sum(2) * (decay ** -np.arange(q))[:, None]).max(0))
+
+    return _rounded_tail(decay, np.abs(lin.input).max(0), rows)
+
+
+def _rounded_tail(decay: float, into: Array, out: Callable[[int], Array]) -> Tail:
+    """Rounded up by more than eigenvectors and float32 can be off; few digits make the result the same on every processor."""
+    wider = 1 + 1e-6
+    kept = float(up32(digits(np.array(min(max(decay, SMALLEST_DECAY) * wider + 1e-9, 1 - 1e-7)), 7)))
+    return Tail(kept, up32(digits(into * wider, 7)), lambda taps: digits(out(taps) * wider, 7))
+
+
+def _taps(share: Array, constant: Array, tail: Tail, radius: Array, least: int) -> int:
+    """Fewest taps behind which the bound of the tail is a small part of the threshold at the usual radii. `share`: lags x residuals."""
+    limit = TAIL_SHARE * (constant + share.sum(0))
+    bound = float(tail.input @ radius) / (1 - tail.decay)
+    for taps in range(least, TAPS_MAX):
+        if np.all(tail.output(taps) * bound <= limit):
+            return taps
+    return TAPS_MAX
 
 
 def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array, interval_max: int, where: str) -> HullTables:
@@ -153,7 +177,8 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
 
     share = (weights * radius).sum(2)
     # What rounding adds to the lags behind the taps is no impulse response: it goes into the constant, with radii as wide as the ranges.
-    taps = next((t for t in range(max(interval_max, 2), TAPS_MAX) if np.all(share[t:].sum(0) <= TAIL_SHARE * (driven[-1] + share.sum(0)))), TAPS_MAX)
+    tail = _tail(lin)
+    taps = _taps(share, driven[-1], tail, radius, max(interval_max, 2))
     at_once = at_once + loss.behind + mul(loss.weight[taps:].sum(0), 2 * ranges.value[:, None])[:, 0]
     driven = np.concatenate([np.zeros((1, F.shape[1])), driven]) + at_once
     steady = driven[-1] + share.sum(0)
@@ -165,16 +190,15 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
     moving_rows = driven[: settle + 1] + moving[: settle + 1]
     rest_rows[settle], moving_rows[settle] = limit + later_rest[settle], limit + later[settle]
     widen = 1 + (taps * weights.shape[2] + 16) * U32 * 1.01
-    decay, tail_input, tail_output = _tail(lin, taps)
     return HullTables(
         weight=up32(weights[:taps] * widen),
         rest=up32(rest_rows * widen),
         moving=up32(moving_rows * widen),
         ready_rest=_ready(initial, steady),
         ready_moving=_ready(moving, steady),
-        decay=decay,
-        tail_input=tail_input,
-        tail_output=up32(tail_output * widen),
+        decay=tail.decay,
+        tail_input=tail.input,
+        tail_output=up32(tail.output(taps) * widen),
         rounding=rounding,
         steady=steady,
     )

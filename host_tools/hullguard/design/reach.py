@@ -88,7 +88,8 @@ def _declared_states(model: Model, state: Array) -> Array:
         places = np.flatnonzero(plant.C[row])
         if len(places) == 1 and not plant.D[row].any():
             s = model.signals[i]
-            bound = max(abs(s.low), abs(s.high)) / abs(plant.C[row, places[0]])
+            # The range is the reading's, noise included: the state may be as far beyond it as the noise.
+            bound = (max(abs(s.low), abs(s.high)) + float(np.abs(plant.Fd[row]).sum())) / abs(plant.C[row, places[0]])
             out[places[0]] = min(out[places[0]], bound)
     unknown = ~np.isfinite(out)
     if unknown.any():

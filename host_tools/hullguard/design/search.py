@@ -55,6 +55,8 @@ def make(plant: SubPlant, v: Array, poles: Array, residuals: int, paths: list[Fa
 
 def smallest_faults(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: list[FaultPath], radius: Array) -> Array:
     """For each fault the size whose largest response within the horizon equals the steady threshold at these radii."""
+    if not paths:
+        return np.zeros(0)
     state, inputs, output, direct = fused(o, f)
     m = plant.C.shape[0]
     Bd = o.T @ plant.Ed - inputs[:, :m] @ plant.Fd
@@ -82,6 +84,8 @@ def between_events(plant: SubPlant, order: int, paths: list[FaultPath], quantum:
     least when the signals in `spoken` were sent at both ends (radius `quantum` there, the usual one in between), and the largest step is asked
     to show with size 1: min J(v) such that v' O = 0 and the sum of the newest sample's answers is 1.
     """
+    if not any(path.into_value[: plant.C.shape[0]].any() for path in paths):
+        raise InputError('objective "between events" needs a fault of one of the generator\'s outputs: name it in its faults')
     m, s = plant.C.shape[0], order
     n, nd, p = plant.A.shape[0], plant.Ed.shape[1], plant.B.shape[1]
     O, Md, Mu = np.zeros((s + 1, m, n)), np.zeros((s + 1, m, s + 1, nd)), np.zeros((s + 1, m, s + 1, p))
@@ -153,8 +157,8 @@ def search(plant: SubPlant, basis: Array, order: int, residuals: int, paths: lis
             o, f = make(plant, v, poles, residuals, paths, aware)
         except (np.linalg.LinAlgError, ValueError):
             continue
-        smallest = smallest_faults(plant, o, f, paths, radius) if paths else np.zeros(1)
-        if best is None or smallest.max() < best.smallest.max():
+        smallest = smallest_faults(plant, o, f, paths, radius)
+        if best is None or (paths and smallest.max() < best.smallest.max()):
             best, centre = Candidate(o, f, smallest), (v, poles)
     if best is None:
         raise InputError("the search found no generator: more trials, other poles or another order may")

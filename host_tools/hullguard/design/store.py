@@ -13,7 +13,7 @@ import tomli_w
 from hullguard.errors import InputError
 from hullguard.model.table import Array, Table
 
-VERSION = 1
+VERSION = 2  # rises when the same model would give other numbers
 HEADER = "# Made by `hullguard design` from {name}.toml. Do not edit: run it again.\n\n"
 
 
@@ -76,15 +76,17 @@ def write(path: Path, name: str, stored: Stored) -> None:
     path.write_text(HEADER.format(name=name) + tomli_w.dumps(data), encoding="utf-8")
 
 
-def read(path: Path) -> Stored:
-    """Read a design file."""
+def read(path: Path) -> Stored | None:
+    """Read a design file; None when there is none, or one of another version, whose numbers are not today's."""
+    if not path.exists():
+        return None
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise InputError(f"{path.name}: not a readable design file ({error}); run hullguard design again") from error
     top = Table(data, path.name)
     if top.whole("version", 0, 10_000) != VERSION:
-        raise InputError(f"{path.name}: written by another version; run hullguard design again")
+        return None
     plant, signals = top.table("plant"), top.table("signals")
     observers = []
     for t in top.tables("observers"):

@@ -186,7 +186,7 @@ def signal_table(s: Signal, start: int, exact: bool) -> SignalTable:
 def message_table(name: str, frame: Frame, length: int) -> MessageTable:
     """hg_message; the frame's length is rounded up to one that the format can carry."""
     if frame.fd:
-        length = next(n for n in (8, 12, 16, 20, 24, 32, 99) if n >= length)
+        length = next((n for n in (8, 12, 16, 20, 24, 32) if n >= length), length)
     if length > (32 if frame.fd else 8):
         cure = "split the group" if frame.fd else "make the frame fd = true, or split the group"
         raise InputError(f"group '{name}': its signals need {length} bytes with protection, more than {32 if frame.fd else 8}; {cure}")

@@ -35,6 +35,7 @@ class Plant:
     Fd: Array  # m x nd
     initial_range: Array  # n: |x(0) - equilibrium| at a start at rest
     equilibrium: Array  # n: the state around which an emulated plant moves
+    equilibrium_input: Array  # p: the input that holds it there
     state_range: Array  # n: |x| in operation as far as it is declared, infinite where it is not
     feedback: Feedback | None
 
@@ -125,7 +126,8 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         if not table.flag("discrete", False):
             A, B = zero_order_hold(A, B, sample_time_s)
     n = A.shape[0]
-    Ed, Fd = _disturbance(table, B, outputs, inputs, noise)
+    Ed, Fd = _disturbance(table, B, D, outputs, inputs, noise)
+    equilibrium = table.vector("equilibrium", n) if "equilibrium" in table else np.zeros(n)
     plant = Plant(
         states=states,
         A=A,
@@ -135,7 +137,8 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         Ed=Ed,
         Fd=Fd,
         initial_range=table.vector("initial_range", n, 0.0),
-        equilibrium=table.vector("equilibrium", n) if "equilibrium" in table else np.zeros(n),
+        equilibrium=equilibrium,
+        equilibrium_input=_holding_input(table, A, B, equilibrium),
         state_range=table.vector("state_range", n, 0.0) if "state_range" in table else np.full(n, np.inf),
         feedback=_feedback(table, A, B) if "feedback" in table else None,
     )
@@ -143,17 +146,29 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
     return plant
 
 
-def _disturbance(table: Table, B: Array, outputs: list[str], inputs: list[str], noise: dict[str, float]) -> tuple[Array, Array]:
-    """Ed, Fd from the disturbance table and from the sensors' noise; measured inputs pass their noise on through B."""
+def _holding_input(table: Table, A: Array, B: Array, equilibrium: Array) -> Array:
+    """The input that keeps the plant at its equilibrium: B u = (I - A) x."""
+    drift = equilibrium - A @ equilibrium
+    held = np.linalg.lstsq(B, drift, rcond=None)[0] if B.shape[1] else np.zeros(0)
+    held = np.where(np.abs(held) < 1e-12, 0.0, held)
+    left = np.abs(drift - B @ held).max()
+    if left > 1e-9 * max(1.0, float(np.abs(equilibrium).max())):
+        raise table.error("equilibrium", f"no input holds the plant there: it would drift by {left:.3g} a sample")
+    return np.asarray(held)
+
+
+def _disturbance(table: Table, B: Array, D: Array, outputs: list[str], inputs: list[str], noise: dict[str, float]) -> tuple[Array, Array]:
+    """Ed, Fd from the disturbance table and from the sensors' noise; measured inputs pass their noise on through B and D."""
     n, m = B.shape[0], len(outputs)
     bounds = table.table("disturbance", optional=True)
     state = _bound(bounds, "state", n)
     output = _bound(bounds, "output", m)
     bounds.close()
     on_output = np.diag([noise.get(s, 0.0) for s in outputs])
-    on_input = B @ np.diag([noise.get(s, 0.0) for s in inputs]) if inputs else np.zeros((n, 0))
+    spread = np.diag([noise.get(s, 0.0) for s in inputs]).reshape(len(inputs), len(inputs))
+    on_input, through = B @ spread, D @ spread
     Ed = np.hstack([state, np.zeros((n, output.shape[1])), np.zeros((n, m)), on_input])
-    Fd = np.hstack([np.zeros((m, state.shape[1])), output, on_output, np.zeros((m, on_input.shape[1]))])
+    Fd = np.hstack([np.zeros((m, state.shape[1])), output, on_output, through])
     used = np.any(Ed, axis=0) | np.any(Fd, axis=0)
     return Ed[:, used], Fd[:, used]
 

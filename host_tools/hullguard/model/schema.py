@@ -166,6 +166,14 @@ class Model:
         """Index of the group whose frame closes the sample."""
         return next(i for i, g in enumerate(self.groups) if g.closing)
 
+    def centre(self, place: int) -> float:
+        """Value of a signal at the plant's equilibrium."""
+        plant = self.plant
+        if place in self.inputs:
+            return float(plant.equilibrium_input[self.inputs.index(place)])
+        row = self.outputs.index(place)
+        return float(plant.C[row] @ plant.equilibrium + plant.D[row] @ plant.equilibrium_input)
+
     def signal(self, name: str) -> int:
         """Place of a signal in the vector, by its name or by the name of a fault."""
         for i, s in enumerate(self.signals):
@@ -393,11 +401,16 @@ def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[
             raise InputError(f"{path.name}: two groups send with identifier 0x{g.frame.id:X}; give each its own")
     closing = [g for g in groups if g.closing]
     for g in groups:
-        if closing and not g.closing and g.frame.id > closing[0].frame.id:
+        if closing and not g.closing and _priority(g.frame) > _priority(closing[0].frame):
             raise InputError(
                 f"{path.name}: group '{g.name}' (0x{g.frame.id:X}) would arrive after the closing frame (0x{closing[0].frame.id:X}): give the closing frame the larger identifier"
             )
     return tuple(groups), order
+
+
+def _priority(frame: Frame) -> tuple[int, bool, int]:
+    """Order of arbitration, first is sent first: the 11 base bits, a standard frame before an extended one, the other 18 bits."""
+    return (frame.id >> 18, True, frame.id & 0x3FFFF) if frame.extended else (frame.id, False, 0)
 
 
 def read_frame(t: Table, data_id: int) -> Frame:
@@ -435,9 +448,13 @@ def _read_trigger(t: Table, members: list[Signal]) -> Trigger:
     interval_max = t.whole("interval_max", 1, 200)
     narrow, wide = _pair(t, "delta", 0.0, 0.999)
     short, long = _pair(t, "silence", 0, interval_max - 1, default=0.0)
+    if short != int(short) or long != int(long):
+        raise t.error("silence", "expected whole samples")
     step = np.linspace(0.0, 1.0, levels) if levels > 1 else np.zeros(1)
     sigma = t.vector("sigma", width, 0.0)
     for s, value in zip(members, sigma, strict=True):
+        if value > s.high - s.low:
+            raise t.error("sigma", f"{value:g} for '{s.name}' is wider than its range: the trigger would never act")
         if value < s.resolution / 2:
             raise t.error("sigma", f"{value:g} for '{s.name}' is below half its resolution of {s.resolution:g}: the trigger could not see it")
     scales = np.array([s.scale for s in members])
@@ -523,6 +540,8 @@ def _read_verdict(t: Table, groups: tuple[Group, ...]) -> tuple[Frame, Frame, in
         inner = t.table("status_frame")
         status = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
     else:
+        if verdict.id == (0x1FFFFFFF if verdict.extended else 0x7FF):
+            raise t.error("frame", "there is no identifier behind it for the status frame; give status_frame, or a smaller id")
         status = Frame(verdict.id + 1, verdict.extended, verdict.fd, (verdict.data_id + 1) & 0xFFFF)
     taken = [g.frame.id for g in groups] + [verdict.id, status.id]
     for i in (verdict.id, status.id):

@@ -9,36 +9,60 @@ from hullguard.bus import candump
 from hullguard.bus.link import CanLink
 from hullguard.core.native import Frame, Native, Node, Verdict
 
-BUSY = -11
+OK = 1  # hg_status
+
+STAMPS = 7  # samples ahead that a stamp can tell
 
 
 class Detector:
-    """A node fed with frames from anywhere; verdict frames go to `send`, verdicts to `watch`."""
+    """A node fed with frames from anywhere; verdict frames go to `send`, verdicts to `watch`.
 
-    def __init__(self, native: Native, start: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None]) -> None:
+    With `period_s` the time stamps of the closing frames are watched: a stamp tells a gap of up to 7 samples, a longer one is an outage.
+    """
+
+    def __init__(self, native: Native, start: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None = None) -> None:
         self.node = Node(native, start)
-        self._lockstep, self._send, self._watch = lockstep, send, watch
-        self.samples = 0
+        self._closing = native.tables.groups[native.tables.closing].message.id
+        self._lockstep, self._send, self._watch, self._period = lockstep, send, watch, period_s
+        self._closed_at: float | None = None
+        self._steps_since = 0
+        self.samples = self.outages = 0
 
-    def take(self, frame: Frame) -> None:
-        """One frame from the bus."""
-        self.node.receive(frame)
+    def take(self, frame: Frame, time_s: float) -> None:
+        """One frame from the bus, with its time stamp."""
+        closing = frame.id == self._closing
+        if closing and self._period is not None and self._closed_at is not None:
+            missed = round((time_s - self._closed_at) / self._period) - 1 - self._steps_since
+            if missed > STAMPS:
+                self.node.outage()
+                self.outages += 1
+        accepted = self.node.receive(frame) == OK
+        self.steps()
+        if closing and accepted:
+            self._closed_at, self._steps_since = time_s, 0
+
+    def overdue(self) -> None:
+        """The closing frame has not come in time: the sample is closed without it."""
+        self.node.overdue()
         self.steps()
 
     def steps(self) -> None:
         """All steps that are due."""
         while (verdict := self.node.step()) is not None:
             self.samples += 1
+            self._steps_since += 1
             self._watch(verdict)
             for frame in self.node.report(self._lockstep):
                 if self._send is not None:
                     self._send(frame)
 
 
-def from_log(detector: Detector, entries: Iterable[candump.Entry]) -> None:
-    """Feed a whole log; verdict frames in it are another node's and pass by as unknown."""
+def from_log(detector: Detector, entries: Iterable[candump.Entry], samples: int) -> None:
+    """Feed a log, whole or until `samples` have passed; verdict frames in it are another node's and pass by as unknown."""
     for entry in entries:
-        detector.take(entry.frame)
+        if samples and detector.samples >= samples:
+            return
+        detector.take(entry.frame, entry.time_s)
 
 
 def from_bus(detector: Detector, link: CanLink, period_s: float, deadline: bool, samples: int, stop: Callable[[], bool]) -> None:
@@ -49,10 +73,9 @@ def from_bus(detector: Detector, link: CanLink, period_s: float, deadline: bool,
         got = link.receive(wait)
         before = detector.samples
         if got is not None:
-            detector.take(got[0])
+            detector.take(got[0], got[1] or time.monotonic())
         elif next_close is not None and time.monotonic() >= next_close:
-            detector.node.overdue()
-            detector.steps()
+            detector.overdue()
         if deadline and detector.samples != before:
             # Half a period of patience: a closing frame may be late, not absent.
             base = time.monotonic() if got is not None or next_close is None else next_close - 0.5 * period_s

@@ -49,6 +49,7 @@ class Trace:
     verdict: list[Verdict] = field(default_factory=list)
     events: list[tuple[int, ...]] = field(default_factory=list)  # groups that sent
     bits: list[int] = field(default_factory=list)
+    heard: list[Verdict] = field(default_factory=list)  # what a node told that runs freely
     reply_bits: int = 0  # of frames sent only because lockstep answers every tick
     counts: dict[str, int] = field(default_factory=lambda: {"measurement": 0, "closing": 0, "verdict": 0, "reply": 0})
     health: dict[str, int] = field(default_factory=dict)
@@ -134,7 +135,24 @@ class Run:
                 watch(k, self.trace)
             source.move()
         self.trace.health = self.node.health()
+        if not self.pace.lockstep and not isinstance(self.bus, InProcess):
+            self._hear_out(count)
         return self.trace
+
+    def _hear_out(self, count: int) -> None:
+        """A free-running node's own words take the place of this process's: what it has not said, nobody has found."""
+        end = time.monotonic() + 2 * self.native.tables.heartbeat * self.design.model.sample_time_s
+        while time.monotonic() < end and (not self.trace.heard or self.trace.heard[-1].k < count - 1):
+            self._answers(count - 1, self.trace.verdict[-1], [], (count - 1) * self.design.model.sample_time_s)
+            time.sleep(0.01)
+        if not self.trace.heard:
+            raise BusError("no verdict frame was seen: is a detector node of this model running on this bus?")
+        groups = len(self.native.tables.groups)
+        said = Verdict(0, "starting", 0, ("absent",) * groups, False)
+        told = {v.k: v for v in self.trace.heard}
+        for k in range(count):
+            said = told.get(k, said)
+            self.trace.verdict[k] = replace(said, k=k)
 
     def _sample(self, source: Source, k: int, time_s: float) -> None:
         reading = source.read()
@@ -163,6 +181,8 @@ class Run:
         for frame, _ in got:
             self._write(frame, time_s)  # a log has one clock, the run's
             told = read_verdict(self.native, frame)
+            if told is not None and not self.pace.lockstep:
+                self.trace.heard.append(replace(told, k=k - (k - told.k) % 4096))
             length = frame_bits(self.native.library, frame)
             if told is not None and told.reply:
                 self.trace.counts["reply"] += 1
@@ -173,8 +193,18 @@ class Run:
         if self.pace.lockstep and self.mismatch is None:
             for frame, own in zip([f for f, _ in got], expected, strict=True):
                 if frame != own:
-                    self.mismatch = f"sample {k}: the node answered {frame.data.hex()} ({read_verdict(self.native, frame)}), this process {own.data.hex()} ({verdict})"
+                    self.mismatch = self._difference(k, frame, own, verdict)
+                    break
         return bits
+
+    def _difference(self, k: int, frame: Frame, own: Frame, verdict: Verdict) -> str:
+        """Why a node's frame is not the one that this process would have sent."""
+        if frame.id == own.id == self.native.tables.status.id and frame.data[2:6] != own.data[2:6]:
+            theirs, ours = (int.from_bytes(f.data[2:6], "little") for f in (frame, own))
+            return f"the node runs a model with hash {theirs:08x}, this process {ours:08x}; build the node from this model"
+        told = read_verdict(self.native, frame)
+        hint = "; start the node with --rest" if k == 0 else ""
+        return f"sample {k}: the node says {told or frame.data.hex()}, this process {verdict}{hint}"
 
     def _write(self, frame: Frame, time_s: float) -> None:
         if self._log is not None:
@@ -244,7 +274,7 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
         },
         "per_group": groups,
         "events": {"interval_min": min(intervals, default=None), "interval_max": max(intervals, default=None)},
-        "faults": [_found(f, native, design, trace, alarms, confirmed, samples) for f in faults],
+        "faults": [_found(f, faults, design, trace, alarms, confirmed) for f in faults],
         "false_alarms": {"provisional": _episodes(alarms[:first]), "confirmed": _episodes(confirmed[:first])},
         "communication": trace.health,
         "margin_max": margin,
@@ -281,9 +311,12 @@ def _episodes(flags: Sequence[bool]) -> int:
     return sum(1 for before, now in zip([False, *flags], flags, strict=False) if now and not before)
 
 
-def _found(f: FaultSpec, native: Native, design: Design, trace: Trace, alarms: list[bool], confirmed: list[bool], samples: int) -> dict[str, Any]:
-    detected = next((k for k in range(f.start, samples) if alarms[k]), None)
-    sure = next((k for k in range(f.start, samples) if confirmed[k]), None)
+def _found(f: FaultSpec, faults: Sequence[FaultSpec], design: Design, trace: Trace, alarms: list[bool], confirmed: list[bool]) -> dict[str, Any]:
+    """When a fault was found: an alarm that rises while it is the newest one. What rose before it, or after a later fault began, is not its own."""
+    last = min((o.start for o in faults if o.start > f.start), default=len(alarms))
+    quiet = next((k for k in range(f.start, last) if k == 0 or not alarms[k - 1]), last)
+    detected = next((k for k in range(quiet, last) if alarms[k]), None)
+    sure = None if detected is None else next((k for k in range(detected, len(alarms)) if confirmed[k]), None)
     bits = trace.verdict[detected].candidates if detected is not None else 0
     return {
         "name": f.name,
