@@ -535,7 +535,7 @@ static void two_late_ticks_restart_with_nothing_known(void **state)
             sample(&r, k, 640, 640, 640);
         }
         assert_status(HG_OK, give(&r, 0U, 5U, 640, 640)); /* of the sample that this node believed to be open */
-        r.counter[1] = (uint8_t)(r.counter[1] + (ahead / 2U)); /* 15 lost would read as a repetition first */
+        r.counter[1] = (uint8_t)(r.counter[1] + (ahead / 2U)); /* fewer than 15 lost: those would restart at once */
         assert_status(HG_E_STAMP, give(&r, 1U, 5U + ahead, 0, 0));
         assert_status(HG_OK, give(&r, 1U, 5U + ahead, 0, 0));
         step(&r, 5U + ahead); /* forward only */
@@ -877,6 +877,32 @@ static void an_outage_that_is_told_is_no_plant_fault(void **state)
     }
 }
 
+/* Another frame with the same counter: 15 were lost, or its sender began anew. No second one is waited for. */
+static void a_tick_whose_counter_stands_still_restarts_the_detector(void **state)
+{
+    (void)state;
+    for (uint32_t k = 5U; k < 21U; k++) {
+        for (int deadline = 0; deadline <= 1; deadline++) {
+            static rig r;
+            begin(&r, HG_START_REST);
+            for (uint32_t i = 0U; i < 5U; i++) {
+                sample(&r, i, 640, 640, 640);
+            }
+            for (uint32_t i = 5U; (deadline != 0) && (i < k); i++) {
+                hg_node_overdue(&r.self);
+                step(&r, i);
+            }
+            r.counter[1]--;
+            assert_status(HG_OK, give(&r, 1U, k, 641, 0));
+            step(&r, k);
+            nothing_is_due(&r);
+            nothing_is_known_but_the_closing_frame(&r);
+            assert_int_equal(0, hg_node_health(&r.self, 1U)->late);
+            assert_int_equal(15, hg_node_health(&r.self, 1U)->lost);
+        }
+    }
+}
+
 static void an_outage_drops_the_steps_that_are_due(void **state)
 {
     (void)state;
@@ -886,7 +912,9 @@ static void an_outage_drops_the_steps_that_are_due(void **state)
     r.counter[1] = (uint8_t)(r.counter[1] + 3U);
     assert_status(HG_OK, give(&r, 1U, 4U, 640, 0)); /* 1 .. 4 */
     step(&r, 1U);
+    assert_true(r.self.closed);
     hg_node_outage(&r.self);
+    assert_false(r.self.closed);
     nothing_is_due(&r);
     hg_node_outage(&r.self); /* said twice is said once */
     assert_status(HG_E_STAMP, give(&r, 0U, 2U, 640, 640)); /* the open sample's, but who knows */
@@ -1287,6 +1315,7 @@ int main(void)
         cmocka_unit_test(two_nodes_share_tables_and_nothing_else),
         cmocka_unit_test(a_sender_that_leaps_or_begins_anew_restarts_the_detector),
         cmocka_unit_test(an_outage_that_is_told_is_no_plant_fault),
+        cmocka_unit_test(a_tick_whose_counter_stands_still_restarts_the_detector),
         cmocka_unit_test(an_outage_drops_the_steps_that_are_due),
         cmocka_unit_test(no_alarm_is_confirmed_without_a_fault_whatever_the_link_does),
         cmocka_unit_test(the_first_verdict_is_told_with_the_status),
