@@ -70,7 +70,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, models: Models) -> tuple[
     """A run with its files, made as a process: what is on stdout is the JSON and nothing else."""
     out = tmp_path_factory.mktemp("run") / "deep" / "er"
     command = [sys.executable, "-m", "hullguard", "run", "platoon", "--scenario", "manoeuvres", "--samples", "220", "--seed", "11", "--bus", "inprocess"]
-    command += ["--fault", "controller2:bias:1.5@100", "--fault", "gap12_m:noise:0.2@180..200", "--expect", "detect", "--out", str(out), "--json"]
+    command += ["--fault", "controller2:bias:1.5@100..130", "--fault", "gap12_m:noise:3@180..200", "--expect", "detect", "--out", str(out), "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return out, json.loads(done.stdout)
@@ -132,7 +132,7 @@ def test_signals_and_labels_of_a_run_agree_with_its_result(finished: tuple[Path,
     with (out / "labels.csv").open(newline="", encoding="utf-8") as file:
         labels = list(csv.DictReader(file))
     assert [(x["start"], x["end"], x["name"], x["kind"], x["signal"]) for x in labels] == [
-        ("100", "", "controller2", "bias", "control2_mps2"),
+        ("100", "130", "controller2", "bias", "control2_mps2"),
         ("180", "200", "gap12_m", "noise", "gap12_m"),
     ]
 
