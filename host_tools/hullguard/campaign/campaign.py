@@ -6,6 +6,7 @@ import contextlib
 import multiprocessing
 import signal
 import threading
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -38,11 +39,16 @@ class Job:
     start: int
 
 
-def chunk(job: Job, first: int, count: int) -> list[dict[str, Any]]:
-    """Runs first .. first + count - 1."""
-    design = finish(job.model, job.stored)
-    native = Native(library(job.real), design.tables)
-    return Batch(native, design, job.samples, job.reference, job.faults, job.seed, job.loss, job.start).runs(first, count)
+_batches: dict[str, Batch] = {}  # of this process, by job: making tables costs as much as a chunk of runs
+
+
+def chunk(job: Job, name: str, first: int, count: int) -> list[dict[str, Any]]:
+    """Runs first .. first + count - 1 of a job with this name."""
+    if name not in _batches:
+        design = finish(job.model, job.stored)
+        native = Native(library(job.real), design.tables)
+        _batches[name] = Batch(native, design, job.samples, job.reference, job.faults, job.seed, job.loss, job.start)
+    return _batches[name].runs(first, count)
 
 
 @contextlib.contextmanager
@@ -62,16 +68,18 @@ def campaign(job: Job, runs: int, workers: int, tick: Callable[[int], None]) -> 
     """All rows, in the order of the runs. `tick` gets the number of runs that have just ended."""
     parts = [(first, min(CHUNK, runs - first)) for first in range(0, runs, CHUNK)]
     rows: list[dict[str, Any]] = []
+    name = uuid.uuid4().hex
     if workers <= 1 or len(parts) == 1:
         for first, count in parts:
-            rows += chunk(job, first, count)
+            rows += chunk(job, name, first, count)
             tick(count)
+        _batches.clear()
         return rows
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         with _deaf():  # each of the first tasks starts a worker
-            waiting = {pool.submit(chunk, job, first, count): count for first, count in parts[:workers]}
+            waiting = {pool.submit(chunk, job, name, first, count): count for first, count in parts[:workers]}
         try:
-            waiting |= {pool.submit(chunk, job, first, count): count for first, count in parts[workers:]}
+            waiting |= {pool.submit(chunk, job, name, first, count): count for first, count in parts[workers:]}
             for done in as_completed(waiting):
                 rows += done.result()
                 tick(waiting[done])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -140,16 +141,11 @@ def find(model: Model, tick: Tick) -> Stored:
         where = f"{model.path.name}: detector.observers[{i}]"
         basis = check_parity(sub, spec.order, where)
         paths = fault_paths(model, spec, spec.faults)
-        steps = iter(range(1, spec.search.trials + 1))
-
-        def step(i: int = i, steps: object = steps, trials: int = spec.search.trials) -> None:
-            tick(f"generator {i + 1} of {len(model.observers)}", next(steps), trials)  # type: ignore[call-overload]
-
         own = np.concatenate([sub.Sy, sub.Su])
-        if spec.search.objective == "between events":
+        if not spec.filtered:
             best = between_events(sub, spec.order, paths, *_spoken(model, spec))
         else:
-            best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, step)
+            best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
         o, f = best.observer, best.filter
         observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
     gain = plant.feedback.gain if plant.feedback is not None else None
@@ -165,8 +161,7 @@ def refilter(model: Model, old: Stored) -> Stored:
     for spec, stored in zip(model.observers, old.observers, strict=True):
         sub = sub_plant(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), spec, radius)
         G, H, L, T = structure(sub, stored.v, stored.gamma)
-        plain = spec.search.objective == "between events"
-        f = no_filter(spec.order) if plain else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
+        f = no_filter(spec.order) if not spec.filtered else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
         observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
     return replace(found, observers=tuple(observers))
 
@@ -203,7 +198,7 @@ def finish(model: Model, stored: Stored) -> Design:
     tables = _tables(model, groups, generators)
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
-    checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.search.objective != "between events")]
+    checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
     return Design(model, stored, generators, tables, tuple(checks), bound)
@@ -232,8 +227,7 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     sub = sub_plant(model, spec, radius)
     G, H, L, T = structure(sub, found.v, found.gamma)
     o = ObserverMatrices(found.v, found.gamma, G, H, L, T, found.W, found.V, found.V @ sub.D)
-    filtered = spec.search.objective != "between events"
-    solved = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, spec.aware) if filtered else no_filter(spec.order)
+    solved = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, spec.aware) if spec.filtered else no_filter(spec.order)
     f = replace(solved, Lo=found.Lo, Mo=found.Mo)
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
@@ -245,7 +239,7 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]")
     paths = fault_paths(model, spec, spec.faults)
     blind = np.full(len(paths), np.inf)
-    if paths and filtered:
+    if paths and spec.filtered:
         try:
             plain = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, False)
             blind = smallest_faults(sub, o, plain, paths, own)

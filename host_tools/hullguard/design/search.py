@@ -138,14 +138,16 @@ def _draw(rng: np.random.Generator, plant: SubPlant, basis: Array, order: int, p
     return v, rng.uniform(*poles, order)
 
 
-def search(plant: SubPlant, basis: Array, order: int, residuals: int, paths: list[FaultPath], radius: Array, aware: bool, setting: Search, tick: Callable[[], None]) -> Candidate:
+def search(
+    plant: SubPlant, basis: Array, order: int, residuals: int, paths: list[FaultPath], radius: Array, aware: bool, setting: Search, tick: Callable[[int, int], None]
+) -> Candidate:
     """Random trials for two thirds of the budget, then steps around the best; the same seed gives the same result on one machine."""
     rng = np.random.default_rng(setting.seed)
     best: Candidate | None = None
     centre: tuple[Array, Array] | None = None
     step = 0.3
     for trial in range(setting.trials):
-        tick()
+        tick(trial + 1, setting.trials)
         if centre is None or 3 * trial < 2 * setting.trials:
             v, poles = _draw(rng, plant, basis, order, setting.poles)
         else:

@@ -98,6 +98,11 @@ class Observer:
     aware: bool  # trigger-aware post-filter
     search: Search
 
+    @property
+    def filtered(self) -> bool:
+        """Whether the generator has a post-filter; a difference between events has none, it would forget the frame it starts from."""
+        return self.search.objective != "between events"
+
 
 @dataclass(frozen=True)
 class Fault:
