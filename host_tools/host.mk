@@ -27,7 +27,7 @@ openacc-generated: lib
 	@$(PY) tests/openacc/openacc.py --generated --misses $(BUILD)/openacc-generated-misses.txt
 
 .PHONY: pytest
-pytest: lib apps with-vcan $(BUILD)/oracle/oracle_run ## tests of the host tools, and of the node on vcan
-	@$(PY) -m pytest -q -p no:cacheprovider tests/host tests/node
+pytest: lib apps with-vcan $(BUILD)/oracle/oracle_run ## tests of the host tools, and of the node on vcan (HULLGUARD_SEED=n: other random cases)
+	@HULLGUARD_SEED=$${HULLGUARD_SEED:-1} $(PY) -m pytest -q -p no:cacheprovider tests/host tests/node
 
 TEST_PARTS += apps pytest openacc-generated lint coverage

@@ -18,7 +18,7 @@ from hullguard.core.library import library
 from hullguard.core.native import Frame, frame_bits
 from hullguard.design.tables import MessageTable
 from hullguard.errors import InputError
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
@@ -134,6 +134,7 @@ def test_lines_as_other_tools_write_them_are_understood(tmp_path: Path, text: st
     assert found[0].frame == expected
 
 
+@example("#")
 @given(st.text(max_size=40))
 def test_no_line_does_anything_but_become_a_frame_or_be_refused(text: str) -> None:
     for raw in (text, "(1.0) can0 " + text, "(1.0) can0 123#" + text, "(1.0) can0 123##" + text, "(1.0) can0 12345678#R" + text):

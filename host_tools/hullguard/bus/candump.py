@@ -13,6 +13,7 @@ from hullguard.errors import InputError
 
 EXTENDED, REMOTE, FD, BRS, ERROR = 0x01, 0x02, 0x04, 0x08, 0x10
 _ERROR_BIT = 0x20000000
+HEX = tuple("0123456789abcdefABCDEF")
 _LINE = re.compile(r"^\((?P<time>\d+\.\d{1,9})\)\s+(?P<channel>\S+)\s+(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(?P<rest>[#0-9A-Fa-fR]*)(\s+[RT])?\s*$")
 
 
@@ -71,10 +72,10 @@ def _entry(raw: str, where: str) -> Entry:
     flags = EXTENDED if len(found["id"]) == 8 else 0
     if flags and number & _ERROR_BIT:
         flags, number = ERROR, number & ~_ERROR_BIT
-    if rest == "#":
-        raise InputError(f"{where}: '##' without the digit of FD flags")
     if rest.startswith("#"):
-        flags |= FD | (BRS if len(rest) > 1 and int(rest[1], 16) & 1 else 0)
+        if rest[1:2] not in HEX:
+            raise InputError(f"{where}: '##' without the digit of FD flags")
+        flags |= FD | (BRS if int(rest[1], 16) & 1 else 0)
         rest = rest[2:]
     elif rest.startswith("R"):
         return Entry(float(found["time"]), found["channel"], Frame(number, flags | REMOTE, b""))
