@@ -36,6 +36,7 @@ void hg_decision_reset(hg_decision *self)
     for (uint8_t g = 0U; g < self->config->generators; g++) {
         forget(&self->alarm[g]);
     }
+    self->left = UINT32_MAX;
 }
 
 static uint8_t next(uint8_t counter, uint8_t limit)
@@ -97,6 +98,13 @@ hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32
             }
         }
     }
-    *candidates = common;
+    if (plant == HG_PLANT_CONFIRMED) {
+        self->left &= common;
+    } else if (plant != HG_PLANT_PROVISIONAL) {
+        self->left = UINT32_MAX; /* the episode is over */
+    } else {
+        /* nothing is sure yet */
+    }
+    *candidates = common & self->left;
     return plant;
 }

@@ -4,17 +4,70 @@
 
 uint32_t hg_detector_reals(const hg_detector_config *config)
 {
-    uint32_t reals = (3U * (uint32_t)config->signals) + (2U * (uint32_t)config->residuals);
-    reals += HG_RADII_REALS(config->signals, config->history);
+    uint32_t reals = (3U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals);
+    reals += HG_RING_REALS(config->width, config->history) + HG_RING_REALS(config->signals, config->window);
     for (uint8_t g = 0U; g < config->generators; g++) {
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
+    }
+    for (uint8_t i = 0U; i < config->predictors; i++) {
+        reals += HG_PREDICT_REALS(config->predict[i].order, config->predict[i].inputs, config->predict[i].width);
     }
     return reals;
 }
 
+uint32_t hg_detector_sums(const hg_detector_config *config)
+{
+    uint32_t sums = 0U;
+    for (uint8_t b = 0U; b < config->banks; b++) {
+        sums += HG_BANK_SUMS(config->bank[b].certificates);
+    }
+    return sums;
+}
+
+static bool sizes_valid(const hg_detector_config *config)
+{
+    const uint16_t judged = (uint16_t)config->generators + config->banks;
+    bool valid = (config->signals >= 1U) && (config->width >= config->signals) && (config->history >= 1U) && (config->groups >= 1U) &&
+                 (config->groups <= HG_GROUPS_MAX) && (config->predictors <= HG_GROUPS_MAX) && (config->hold != NULL);
+    valid = valid && (judged >= 1U) && (judged <= HG_GENERATORS_MAX) && (judged == config->decision.generators);
+    valid = valid && ((config->generators == 0U) || ((config->residual != NULL) && (config->hull != NULL)));
+    valid = valid && ((config->banks == 0U) || ((config->bank != NULL) && (config->window >= 1U)));
+    return valid && ((config->predictors == 0U) || (config->predict != NULL));
+}
+
+static bool memory_there(const hg_detector_config *config, const hg_detector_memory *memory)
+{
+    bool there = (memory->hold != NULL) && (memory->alarm != NULL) && (memory->code != NULL) && (memory->real != NULL);
+    there = there && ((config->generators == 0U) || ((memory->residual != NULL) && (memory->hull != NULL)));
+    there = there && ((config->banks == 0U) || ((memory->bank != NULL) && (memory->sum != NULL)));
+    return there && ((config->predictors == 0U) || (memory->predict != NULL));
+}
+
+/* Derived signals fill the vector exactly, each group that is predicted is there and has the signals that its predictor says. */
+static bool derived_valid(const hg_detector_config *config)
+{
+    uint16_t width = config->signals;
+    bool valid = true;
+    for (uint8_t i = 0U; valid && (i < config->predictors); i++) {
+        const hg_predict_config *predict = &config->predict[i];
+        uint16_t first = 0U;
+        valid = (predict->group < config->groups) && hg_predict_valid(predict, config->signals);
+        for (uint8_t g = 0U; valid && (g < predict->group); g++) {
+            first += config->hold[g].trigger->width;
+        }
+        valid = valid && (predict->first == first) && (predict->width == config->hold[predict->group].trigger->width);
+        width += predict->width;
+    }
+    if (valid && (config->mismatch != NULL)) {
+        valid = hg_mismatch_valid(config->mismatch, config->signals);
+        width += config->mismatch->states;
+    }
+    return valid && (width == config->width);
+}
+
 static bool generators_valid(const hg_detector_config *config)
 {
-    uint32_t residuals = 0U;
+    uint32_t residuals = config->banks;
     bool valid = true;
     for (uint8_t g = 0U; g < config->generators; g++) {
         valid = valid && (config->residual[g].residuals == config->hull[g].residuals);
@@ -25,8 +78,11 @@ static bool generators_valid(const hg_detector_config *config)
         }
         valid = valid && (config->residual[g].signal != NULL);
         for (uint8_t i = 0U; valid && (i < config->residual[g].width); i++) {
-            valid = config->residual[g].signal[i] < config->signals;
+            valid = config->residual[g].signal[i] < config->width;
         }
+    }
+    for (uint8_t b = 0U; valid && (b < config->banks); b++) {
+        valid = (config->bank[b].window <= config->history) && hg_bank_valid(&config->bank[b], config->signals, config->width, config->window);
     }
     return valid && (residuals == config->residuals);
 }
@@ -46,12 +102,13 @@ static hg_status start_holds(hg_detector *self)
     return (first == config->signals) ? status : HG_E_CONFIG;
 }
 
+/* Everything between the holds and the decision takes its memory from one piece, in this order. */
 static hg_status start_generators(hg_detector *self, hg_start how)
 {
     const hg_detector_config *config = self->config;
-    hg_real *memory = &self->past[config->signals];
-    hg_status status = hg_radii_start(&self->radii, config->signals, config->history, memory);
-    memory = &memory[HG_RADII_REALS(config->signals, config->history)];
+    hg_real *memory = &self->past[config->width];
+    hg_status status = hg_ring_start(&self->radii, config->width, config->history, memory);
+    memory = &memory[HG_RING_REALS(config->width, config->history)];
     for (uint8_t g = 0U; (status == HG_OK) && (g < config->generators); g++) {
         status = hg_residual_start(&self->memory.residual[g], &config->residual[g], memory);
         if (status == HG_OK) {
@@ -59,36 +116,50 @@ static hg_status start_generators(hg_detector *self, hg_start how)
         }
         memory = &memory[HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width)];
     }
+    for (uint8_t i = 0U; (status == HG_OK) && (i < config->predictors); i++) {
+        const hg_predict_config *predict = &config->predict[i];
+        status = hg_predict_start(&self->memory.predict[i], predict, memory);
+        memory = &memory[HG_PREDICT_REALS(predict->order, predict->inputs, predict->width)];
+    }
+    if ((status == HG_OK) && (config->banks > 0U)) {
+        hg_acc *sum = self->memory.sum;
+        status = hg_ring_start(&self->values, config->signals, config->window, memory);
+        for (uint8_t b = 0U; (status == HG_OK) && (b < config->banks); b++) {
+            status = hg_bank_start(&self->memory.bank[b], &config->bank[b], sum);
+            sum = &sum[HG_BANK_SUMS(config->bank[b].certificates)];
+        }
+    }
     return status;
 }
 
 hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory, hg_start how)
 {
-    if ((self == NULL) || (config == NULL) || (memory == NULL) || (memory->hold == NULL) || (memory->residual == NULL) ||
-        (memory->hull == NULL) || (memory->code == NULL) || (memory->real == NULL)) {
+    if ((self == NULL) || (config == NULL) || (memory == NULL)) {
         return HG_E_ARGUMENT;
     }
-    if ((config->signals < 1U) || (config->history < 1U) || (config->groups < 1U) || (config->groups > HG_GROUPS_MAX) ||
-        (config->generators < 1U) || (config->generators > HG_GENERATORS_MAX) || (config->generators != config->decision.generators) ||
-        (config->hold == NULL) || (config->residual == NULL) || (config->hull == NULL)) {
+    if (!sizes_valid(config)) {
         return HG_E_CONFIG;
     }
-    if ((memory->codes < (2U * (uint16_t)config->signals)) || (memory->reals < hg_detector_reals(config))) {
+    if (!memory_there(config, memory)) {
+        return HG_E_ARGUMENT;
+    }
+    if ((memory->codes < (2U * (uint16_t)config->signals)) || (memory->reals < hg_detector_reals(config)) ||
+        (memory->sums < hg_detector_sums(config))) {
         return HG_E_SIZE;
     }
     self->config = config;
     self->memory = *memory;
     self->refusals = 0U;
     self->value = memory->real;
-    self->radius = &self->value[config->signals];
-    self->r = &self->radius[config->signals];
+    self->radius = &self->value[config->width];
+    self->r = &self->radius[config->width];
     self->J = &self->r[config->residuals];
     self->past = &self->J[config->residuals];
     for (uint32_t i = 0U; i < memory->reals; i++) {
         memory->real[i] = HG_REAL_ZERO;
     }
     hg_status status = start_holds(self);
-    if ((status == HG_OK) && (!generators_valid(config))) {
+    if ((status == HG_OK) && ((!derived_valid(config)) || (!generators_valid(config)))) {
         status = HG_E_CONFIG;
     }
     if (status == HG_OK) {
@@ -99,7 +170,13 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
 
 void hg_detector_restart(hg_detector *self, hg_start how)
 {
-    hg_radii_reset(&self->radii);
+    hg_ring_reset(&self->radii);
+    for (uint8_t i = 0U; i < self->config->predictors; i++) {
+        hg_predict_reset(&self->memory.predict[i]);
+    }
+    for (uint8_t b = 0U; b < self->config->banks; b++) {
+        hg_bank_reset(&self->memory.bank[b]);
+    }
     for (uint8_t g = 0U; g < self->config->generators; g++) {
         hg_residual_reset(&self->memory.residual[g]);
         hg_hull_reset(&self->memory.hull[g], how);
@@ -131,6 +208,72 @@ hg_status hg_detector_lose(hg_detector *self, uint8_t group)
     return HG_OK;
 }
 
+/* Does an input's radius stand, whatever shows later? One that relies on silence may have to be taken back, which no prediction could follow;
+   an input that any radius will do for has nothing to take back. */
+static bool inputs_certain(const hg_detector_config *config, const hg_predict_config *predict, uint8_t doubt)
+{
+    bool certain = true;
+    uint8_t first = 0U;
+    for (uint8_t i = 0U; i < config->groups; i++) {
+        const hg_hold_config *hold = &config->hold[i];
+        const uint8_t end = (uint8_t)(first + hold->trigger->width);
+        const bool settled = (doubt & (uint8_t)(1U << i)) == 0U;
+        for (uint8_t g = 0U; g < predict->inputs; g++) {
+            const uint8_t place = predict->input[g];
+            const bool own = (place >= first) && (place < end);
+            certain = certain && (settled || (!own) || (predict->known[g] >= hold->span[place - first]));
+        }
+        first = end;
+    }
+    return certain;
+}
+
+/* Signals that follow from the sent ones: value and radius of each. */
+static void derive(hg_detector *self, uint8_t doubt)
+{
+    const hg_detector_config *config = self->config;
+    uint8_t place = config->signals;
+    for (uint8_t i = 0U; i < config->predictors; i++) {
+        const hg_predict_config *predict = &config->predict[i];
+        /* An age beyond every horizon ends the prediction. */
+        const uint8_t age = inputs_certain(config, predict, doubt) ? hg_hold_age(&self->memory.hold[predict->group]) : UINT8_MAX;
+        hg_predict_step(&self->memory.predict[i], age, self->value, self->radius, &self->value[place], &self->radius[place]);
+        place += predict->width;
+    }
+    if (config->mismatch != NULL) {
+        hg_mismatch_step(config->mismatch, self->value, self->radius, &self->radius[place]); /* their values stay 0 */
+    }
+}
+
+/* The radii of one group at a past sample turn out wider, and with them what was derived from them. */
+static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t lag)
+{
+    const hg_detector_config *config = self->config;
+    const uint8_t width = config->hold[group].trigger->width;
+    hg_real *row = hg_ring_row(&self->radii, lag);
+    uint8_t place = config->signals;
+    for (uint8_t g = 0U; g < config->signals; g++) {
+        self->past[g] = row[g];
+    }
+    hg_hold_past(&self->memory.hold[group], lag, &self->past[first]);
+    for (uint8_t i = 0U; i < config->predictors; i++) {
+        const hg_predict_config *predict = &config->predict[i];
+        /* Where the prediction was the tighter one it still is; the held one's wider radius holds for either. */
+        for (uint8_t g = 0U; (predict->group == group) && (g < width); g++) {
+            row[place + g] = hg_real_max(row[place + g], self->past[first + g]);
+        }
+        place += predict->width;
+    }
+    if (config->mismatch != NULL) {
+        for (uint8_t g = 0U; g < config->signals; g++) {
+            self->past[g] = self->past[g] - row[g];
+        }
+        hg_mismatch_grow(config->mismatch, self->past, &row[place]);
+        hg_hold_past(&self->memory.hold[group], lag, &self->past[first]);
+    }
+    hg_ring_rewrite(&self->radii, lag, first, width, &self->past[first]);
+}
+
 /* Close the sample in every hold; radii of the past are corrected where a loss has just shown. */
 static void step_holds(hg_detector *self, hg_evidence *evidence)
 {
@@ -147,25 +290,31 @@ static void step_holds(hg_detector *self, hg_evidence *evidence)
         }
         first += hold->config->trigger->width;
     }
-    (void)hg_radii_push(&self->radii, self->radius);
+    for (uint8_t g = 0U; g < self->config->signals; g++) {
+        self->radius[g] = hg_real_min(self->radius[g], HG_REAL_MAX); /* NaN too: a row that the ring refuses would shift all others */
+    }
+    derive(self, evidence->doubt);
+    (void)hg_ring_push(&self->radii, self->radius);
     first = 0U;
     for (uint8_t i = 0U; i < self->config->groups; i++) {
-        const uint8_t width = self->config->hold[i].trigger->width;
-        for (uint8_t lag = 1U; lag <= rewind[i]; lag++) {
-            hg_hold_past(&self->memory.hold[i], lag, self->past);
-            hg_radii_rewrite(&self->radii, lag, first, width, self->past);
+        for (uint8_t lag = 1U; (lag <= rewind[i]) && (lag < self->config->history); lag++) {
+            widen_past(self, i, first, lag);
         }
-        first += width;
+        first += self->config->hold[i].trigger->width;
     }
 }
 
-hg_status hg_detector_step(hg_detector *self, hg_finding *finding)
+static void refuse(hg_detector *self)
 {
-    hg_evidence evidence = {.alarm = 0U, .ready = true, .doubt = 0U, .rewound = 0U};
+    self->refusals += (self->refusals < UINT32_MAX) ? 1U : 0U;
+}
+
+/* Residuals and thresholds of the generators. */
+static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
+{
     hg_status status = HG_OK;
     hg_real *r = self->r;
     hg_real *J = self->J;
-    step_holds(self, &evidence);
     for (uint8_t g = 0U; g < self->config->generators; g++) {
         const uint8_t n = self->config->residual[g].residuals;
         hg_hull *hull = &self->memory.hull[g];
@@ -175,18 +324,57 @@ hg_status hg_detector_step(hg_detector *self, hg_finding *finding)
             /* A sample is missing from z for good: only a start anywhere in the range is still true of it. */
             hg_residual_reset(&self->memory.residual[g]);
             hg_hull_reset(hull, HG_START_MOVING);
-            self->refusals += (self->refusals < UINT32_MAX) ? 1U : 0U;
+            refuse(self);
             status = moved;
         } else if (hg_decision_exceeds(r, J, n)) {
-            evidence.alarm |= (uint32_t)1U << g;
+            evidence->alarm |= (uint32_t)1U << g;
         } else {
             /* within its threshold */
         }
-        evidence.ready = evidence.ready && hg_hull_ready(hull);
+        evidence->ready = evidence->ready && hg_hull_ready(hull);
         r = &r[n];
         J = &J[n];
     }
+    return status;
+}
+
+/* The same of the banks. A sample that cannot be kept is missing from every window. */
+static hg_status step_banks(hg_detector *self, hg_evidence *evidence)
+{
+    const hg_detector_config *config = self->config;
+    const hg_status kept = (config->banks > 0U) ? hg_ring_push(&self->values, self->value) : HG_OK;
+    hg_status status = HG_OK;
+    for (uint8_t b = 0U; b < config->banks; b++) {
+        const uint16_t place = (uint16_t)((config->residuals - config->banks) + b);
+        hg_bank *bank = &self->memory.bank[b];
+        hg_status judged = kept;
+        if (kept == HG_OK) {
+            judged = hg_bank_step(bank, &self->values, &self->radii, &self->r[place], &self->J[place]);
+        } else {
+            hg_bank_reset(bank);
+            self->r[place] = HG_REAL_ZERO;
+            self->J[place] = config->bank[b].bias[0];
+        }
+        if (judged == HG_E_NUMERIC) {
+            refuse(self);
+            status = judged;
+        } else if (hg_decision_exceeds(&self->r[place], &self->J[place], 1U)) {
+            evidence->alarm |= (uint32_t)1U << ((uint32_t)config->generators + b);
+        } else {
+            /* within its threshold, or the window is not full */
+        }
+        evidence->ready = evidence->ready && hg_bank_ready(bank);
+    }
+    return status;
+}
+
+hg_status hg_detector_step(hg_detector *self, hg_finding *finding)
+{
+    hg_evidence evidence = {.alarm = 0U, .ready = true, .doubt = 0U, .rewound = 0U};
+    step_holds(self, &evidence);
+    const hg_status generators = step_generators(self, &evidence);
+    const hg_status banks = step_banks(self, &evidence);
     finding->plant = hg_decision_step(&self->decision, &evidence, &finding->candidates);
     finding->basis = HG_BASIS_SET;
-    return status;
+    return (generators == HG_OK) ? banks : generators;
 }

@@ -176,6 +176,11 @@ bool hg_hold_doubt(const hg_hold *self)
     return self->doubt;
 }
 
+uint8_t hg_hold_age(const hg_hold *self)
+{
+    return self->age;
+}
+
 hg_bus_health hg_hold_health(const hg_hold *self)
 {
     hg_bus_health health = HG_BUS_GOOD;

@@ -1,57 +1,6 @@
 #include "hullguard/hull.h"
 
-#include "hullguard/linalg.h"
-
 #include <stddef.h>
-
-hg_status hg_radii_start(hg_radii *self, uint8_t width, uint8_t length, hg_real *memory)
-{
-    if ((self == NULL) || (memory == NULL) || (width == 0U) || (length == 0U)) {
-        return HG_E_ARGUMENT;
-    }
-    self->data = memory;
-    self->width = width;
-    self->length = length;
-    hg_radii_reset(self);
-    return HG_OK;
-}
-
-void hg_radii_reset(hg_radii *self)
-{
-    self->newest = 0U;
-    for (uint32_t i = 0U; i < HG_RADII_REALS(self->width, self->length); i++) {
-        self->data[i] = HG_REAL_ZERO;
-    }
-}
-
-hg_status hg_radii_push(hg_radii *self, const hg_real *radius)
-{
-    bool good = hg_linalg_finite(radius, self->width);
-    for (uint8_t g = 0U; g < self->width; g++) {
-        good = good && (radius[g] >= HG_REAL_ZERO);
-    }
-    if (!good) {
-        return HG_E_NUMERIC;
-    }
-    self->newest = ((self->newest + 1U) < self->length) ? (uint8_t)(self->newest + 1U) : 0U;
-    hg_radii_rewrite(self, 0U, 0U, self->width, radius);
-    return HG_OK;
-}
-
-static uint8_t row_of(const hg_radii *self, uint8_t lag)
-{
-    return (self->newest >= lag) ? (uint8_t)(self->newest - lag) : (uint8_t)((self->newest + self->length) - lag);
-}
-
-void hg_radii_rewrite(hg_radii *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *radius)
-{
-    if (lag < self->length) {
-        hg_real *row = &self->data[(uint16_t)row_of(self, lag) * self->width];
-        for (uint8_t g = 0U; g < count; g++) {
-            row[first + g] = radius[g];
-        }
-    }
-}
 
 bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length)
 {
@@ -65,7 +14,7 @@ bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t rin
     return valid;
 }
 
-hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_radii *ring, hg_start how)
+hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_ring *ring, hg_start how)
 {
     if ((self == NULL) || (config == NULL) || (ring == NULL)) {
         return HG_E_ARGUMENT;
@@ -86,10 +35,10 @@ void hg_hull_reset(hg_hull *self, hg_start how)
 }
 
 /* The bound on all lags behind the taps moves on by one sample. */
-static void tail_step(hg_hull *self, const hg_radii *ring)
+static void tail_step(hg_hull *self, const hg_ring *ring)
 {
     const hg_hull_config *config = self->config;
-    const hg_real *leaving = &ring->data[(uint16_t)row_of(ring, config->taps) * ring->width];
+    const hg_real *leaving = hg_ring_row(ring, config->taps);
     hg_acc sum = hg_acc_zero();
     for (uint8_t g = 0U; g < config->width; g++) {
         sum = hg_acc_mac(sum, config->tail_input[g], leaving[config->signal[g]]);
@@ -98,7 +47,7 @@ static void tail_step(hg_hull *self, const hg_radii *ring)
     self->theta = hg_real_min(hg_real_mul(config->decay, self->theta) + hg_acc_real(sum, 0), HG_REAL_MAX);
 }
 
-void hg_hull_step(hg_hull *self, const hg_radii *ring, hg_real *J)
+void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
 {
     const hg_hull_config *config = self->config;
     const uint16_t stride = (uint16_t)config->residuals * config->width;
@@ -109,7 +58,7 @@ void hg_hull_step(hg_hull *self, const hg_radii *ring, hg_real *J)
         hg_acc sum = hg_acc_zero();
         for (uint8_t lag = 0U; lag < config->taps; lag++) {
             const hg_real *weight = &config->weight[((uint32_t)lag * stride) + ((uint32_t)i * config->width)];
-            const hg_real *radius = &ring->data[(uint16_t)row_of(ring, lag) * ring->width];
+            const hg_real *radius = hg_ring_row(ring, lag);
             for (uint8_t g = 0U; g < config->width; g++) {
                 sum = hg_acc_mac(sum, weight[g], radius[config->signal[g]]);
             }

@@ -486,10 +486,10 @@ std::string one_hull(Random &random, HullCount &count)
     (tail.modal ? count.modal : count.power)++;
 
     Reals    memory(static_cast<size_t>(all * length));
-    hg_radii ring{};
+    hg_ring  ring{};
     hg_hull  hull{};
     hg_start how = random.chance(0.5) ? HG_START_REST : HG_START_MOVING;
-    if (hg_radii_start(&ring, static_cast<std::uint8_t>(all), static_cast<std::uint8_t>(length), memory.data()) != HG_OK ||
+    if (hg_ring_start(&ring, static_cast<std::uint8_t>(all), static_cast<std::uint8_t>(length), memory.data()) != HG_OK ||
         hg_hull_start(&hull, &tables.config, &ring, how) != HG_OK) { return "start refused"; }
 
     const oracle::Plant no_plant;
@@ -502,7 +502,7 @@ std::string one_hull(Random &random, HullCount &count)
     for (int step = 0; step < 150; ++step) {
         if (random.chance(0.005)) { /* a restart forgets everything */
             how = random.chance(0.5) ? HG_START_REST : HG_START_MOVING;
-            hg_radii_reset(&ring);
+            hg_ring_reset(&ring);
             hg_hull_reset(&hull, how);
             radii.clear();
             theta = 0.0;
@@ -511,10 +511,10 @@ std::string one_hull(Random &random, HullCount &count)
         random_radii(random, radius, mode);
         if (random.chance(0.02)) {
             Reals bad = radius;
-            bad[0] = random.chance(0.5) ? std::numeric_limits<hg_real>::quiet_NaN() : nearest(-1.0);
-            if (hg_radii_push(&ring, bad.data()) != HG_E_NUMERIC) { return "a bad radius was taken"; }
+            bad[0] = random.chance(0.5) ? std::numeric_limits<hg_real>::quiet_NaN() : std::numeric_limits<hg_real>::infinity();
+            if (hg_ring_push(&ring, bad.data()) != HG_E_NUMERIC) { return "a bad radius was taken"; }
         }
-        if (hg_radii_push(&ring, radius.data()) != HG_OK) { return "push refused"; }
+        if (hg_ring_push(&ring, radius.data()) != HG_OK) { return "push refused"; }
         radii.push_back(radius);
         if (random.chance(0.05)) { /* the past turns out to be worse than thought */
             const int first = random.whole(0, static_cast<int>(all) - 1), many = random.whole(1, static_cast<int>(all) - first);
@@ -522,17 +522,17 @@ std::string one_hull(Random &random, HullCount &count)
             for (int lag = 1; lag <= reach; ++lag) {
                 Reals wide(static_cast<size_t>(many));
                 for (hg_real &w : wide) { w = nearest(random.real(0.0, 5.0)); }
-                hg_radii_rewrite(&ring, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(many), wide.data());
+                hg_ring_rewrite(&ring, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(many), wide.data());
                 if (lag <= k) { std::copy(wide.begin(), wide.end(), radii[static_cast<size_t>(k - lag)].begin() + first); }
             }
             if (reach > k) { /* before the first sample all radii are 0: put that back */
                 const Reals none(static_cast<size_t>(many));
                 for (int lag = k + 1; lag <= reach; ++lag) {
-                    hg_radii_rewrite(&ring, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(many), none.data());
+                    hg_ring_rewrite(&ring, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(many), none.data());
                 }
             }
             const Reals far(static_cast<size_t>(many), nearest(1e6)); /* beyond the ring: ignored */
-            hg_radii_rewrite(&ring, static_cast<std::uint8_t>(std::min(255, length + random.whole(0, 9))), static_cast<std::uint8_t>(first),
+            hg_ring_rewrite(&ring, static_cast<std::uint8_t>(std::min(255, length + random.whole(0, 9))), static_cast<std::uint8_t>(first),
                              static_cast<std::uint8_t>(many), far.data());
         }
         Reals J(static_cast<size_t>(r));

@@ -71,7 +71,7 @@ static const hg_hull_config sm_hull[SM_GENERATORS] = {
 static const uint8_t sm_feeds[] = {0x3U, 0x1U};
 static const uint32_t sm_faults[] = {0x5U, 0x2U};
 static const hg_detector_config sm_detector = {
-    .signals = SM_SIGNALS, .groups = SM_GROUPS, .hold = sm_hold, .generators = SM_GENERATORS, .residual = sm_residual, .hull = sm_hull,
+    .signals = SM_SIGNALS, .width = SM_SIGNALS, .groups = SM_GROUPS, .hold = sm_hold, .generators = SM_GENERATORS, .residual = sm_residual, .hull = sm_hull,
     .decision = {.generators = SM_GENERATORS, .feeds = sm_feeds, .faults = sm_faults, .up = 1U, .down = 3U, .latch = false},
     .history = SM_HISTORY, .residuals = 2U, .codes = SM_CODES, .reals = SM_REALS};
 

@@ -216,6 +216,80 @@ static void candidates_move_every_generator_in_alarm(void **state)
     }
 }
 
+static void candidates_narrow_over_an_episode_and_are_all_there_again_after_it(void **state)
+{
+    (void)state;
+    hg_decision_config c = usual;
+    c.down = 2U;
+    rig r;
+    begin(&r, &c);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0U));
+    assert_int_equal(0x3, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 4U, 0U, 0U)); /* the first has not healed */
+    assert_int_equal(0x2, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 4U, 0U, 0U)); /* the first has healed and counts on */
+    assert_int_equal(HG_PLANT_NONE, (int)r.alarm[0].state);
+    assert_int_equal(0x2, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 0U, 0U, 0U));
+    assert_int_equal(0x2, r.candidates);
+    assert_int_equal(HG_PLANT_NONE, step(&r, 0U, 0U, 0U));
+    assert_int_equal(0, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 4U, 0U, 0U)); /* a new episode */
+    assert_int_equal(0x6, r.candidates);
+}
+
+static void no_single_fault_stays_no_single_fault_until_the_episode_is_over(void **state)
+{
+    (void)state;
+    const uint32_t apart[3] = {1U, 2U, 4U};
+    hg_decision_config c = usual;
+    c.faults = apart;
+    rig r;
+    begin(&r, &c);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 3U, 0U, 0U));
+    assert_int_equal(0, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0U));
+    assert_int_equal(0, r.candidates);
+    assert_int_equal(HG_PLANT_NONE, step(&r, 0U, 0U, 0U));
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0U));
+    assert_int_equal(1, r.candidates);
+}
+
+/* A provisional alarm may be taken back: what it suggests must not outlive it. */
+static void a_provisional_alarm_narrows_nothing_for_good(void **state)
+{
+    (void)state;
+    rig r;
+    begin(&r, &usual);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0U));
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 5U, 0x02U, 0U)); /* a provisional one beside it */
+    assert_int_equal(0x3, r.candidates);
+    assert_int_equal(HG_PLANT_PROVISIONAL, step(&r, 4U, 0x02U, 0U)); /* the first has healed: the episode goes on */
+    assert_int_equal(0x2, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0x02U)); /* taken back */
+    assert_int_equal(0x3, r.candidates);
+    begin(&r, &usual);
+    assert_int_equal(HG_PLANT_PROVISIONAL, step(&r, 1U, 0x01U, 0U));
+    assert_int_equal(0x3, r.candidates);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 4U, 0U, 0x01U)); /* only the other stands */
+    assert_int_equal(0x6, r.candidates);
+}
+
+static void an_episode_ends_in_starting_too_and_with_a_reset(void **state)
+{
+    (void)state;
+    rig r;
+    begin(&r, &usual);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0U));
+    const hg_evidence quiet = {.alarm = 0U, .ready = false, .doubt = 0U, .rewound = 0U};
+    assert_int_equal(HG_PLANT_STARTING, hg_decision_step(&r.self, &quiet, &r.candidates));
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 4U, 0U, 0U));
+    assert_int_equal(0x6, r.candidates);
+    hg_decision_reset(&r.self);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 1U, 0U, 0U));
+    assert_int_equal(0x3, r.candidates);
+}
+
 static void the_worst_generator_is_the_plants_state(void **state)
 {
     (void)state;
@@ -275,6 +349,10 @@ int main(void)
         cmocka_unit_test(debounce_counts_samples_in_a_row),
         cmocka_unit_test(a_latched_alarm_stays_until_reset),
         cmocka_unit_test(candidates_move_every_generator_in_alarm),
+        cmocka_unit_test(candidates_narrow_over_an_episode_and_are_all_there_again_after_it),
+        cmocka_unit_test(no_single_fault_stays_no_single_fault_until_the_episode_is_over),
+        cmocka_unit_test(a_provisional_alarm_narrows_nothing_for_good),
+        cmocka_unit_test(an_episode_ends_in_starting_too_and_with_a_reset),
         cmocka_unit_test(the_worst_generator_is_the_plants_state),
         cmocka_unit_test(starting_shows_unless_there_is_an_alarm),
         cmocka_unit_test(all_thirty_two_generators_have_a_bit),

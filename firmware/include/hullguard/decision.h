@@ -49,6 +49,7 @@ typedef struct {            /* RAM: one a generator */
 typedef struct {            /* RAM: one a model */
     const hg_decision_config *config;
     hg_alarm                 *alarm; /* [generators] */
+    uint32_t                  left;  /* faults that can explain every alarm that was confirmed since the plant was last without one */
 } hg_decision;
 
 typedef struct {            /* what one sample brings */
@@ -72,8 +73,9 @@ hg_status hg_decision_start(hg_decision *self, const hg_decision_config *config,
 void hg_decision_reset(hg_decision *self);
 
 /** One sample.
- *  @param[out] candidates  faults that move every generator whose alarm is confirmed, or, while none is, every one whose alarm is
- *              provisional; 0 without an alarm. Sound for single faults once confirmed.
+ *  @param[out] candidates  faults that can explain every alarm that was confirmed since the plant was last without one, healed ones too, or, while
+ *              none is, every provisional one; 0 without an alarm, and when no single fault explains them all. Once confirmed, the true one is
+ *              among them as long as there is only one.
  *  Result: state of the plant. Cost: generators x 10 operations. */
 hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32_t *candidates);
 

@@ -89,6 +89,9 @@ void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius);
 /** Does a radius since the last good frame rely on the sender's silence? */
 bool hg_hold_doubt(const hg_hold *self);
 
+/** Samples since the last good frame as of the last step, 0 in the sample of a frame; saturates at 255, as does never. */
+uint8_t hg_hold_age(const hg_hold *self);
+
 /** Health of the link as of the last step. */
 hg_bus_health hg_hold_health(const hg_hold *self);
 

@@ -7,46 +7,17 @@
  *  bias: initial state (two tables: started at rest, or in a moving plant), disturbances and all rounding; offline, its last row holds for good.
  *  tail: what lies behind the taps, from above:  theta(k) = decay theta(k-1) + sum_g tail_input_g radius_g(k - taps), tail_i = tail_output_i theta;
  *  it heals as fast as the generator forgets and never keeps a maximum. All tables are rounded so that J is never below the exact hull.
- *  One ring of past radii (hg_radii) serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
+ *  One ring of past radii serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
  *  because J is linear in the radii. Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_HULL_H
 #define HULLGUARD_HULL_H
 
 #include "hullguard/real.h"
+#include "hullguard/ring.h"
 #include "hullguard/status.h"
 
 #include <stdbool.h>
 #include <stdint.h>
-
-typedef struct {        /* RAM: one a detector */
-    hg_real *data;      /* [length][width] */
-    uint8_t  width;     /* signals of the model, 1 .. 255 */
-    uint8_t  length;    /* samples kept, the newest included, 1 .. 255 */
-    uint8_t  newest;    /* row of the newest sample */
-} hg_radii;
-
-/** Memory of a ring, numbers. */
-#define HG_RADII_REALS(width, length) ((uint32_t)(width) * (uint32_t)(length))
-
-/** Begin with all radii 0: the past before the first sample is the initial state's business.
- *  @retval HG_OK          ready
- *  @retval HG_E_ARGUMENT  a null pointer, or width or length 0 */
-hg_status hg_radii_start(hg_radii *self, uint8_t width, uint8_t length, hg_real *memory);
-
-/** Forget all: every radius 0. */
-void hg_radii_reset(hg_radii *self);
-
-/** Enter the radii of a new sample.
- *  @param[in] radius  [width] finite, >= 0
- *  @retval HG_OK         entered
- *  @retval HG_E_NUMERIC  a radius is negative or not finite; nothing changed */
-hg_status hg_radii_push(hg_radii *self, const hg_real *radius);
-
-/** Overwrite the radii of some signals at a past sample.
- *  @param[in] lag     samples before the newest, 1 .. length - 1; more is ignored (the tail already holds it)
- *  @param[in] first   first signal  @param[in] count  signals from there
- *  @param[in] radius  [count] finite, >= 0 */
-void hg_radii_rewrite(hg_radii *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *radius);
 
 typedef struct {                 /* flash: one a generator, generated */
     uint8_t        residuals;    /* 1 .. 255 */
@@ -84,7 +55,7 @@ bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t rin
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
  *  @retval HG_E_CONFIG    hg_hull_valid() says no */
-hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_radii *ring, hg_start how);
+hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_ring *ring, hg_start how);
 
 /** Begin again. */
 void hg_hull_reset(hg_hull *self, hg_start how);
@@ -92,7 +63,7 @@ void hg_hull_reset(hg_hull *self, hg_start how);
 /** Threshold of this sample, whose radii are the newest row of the ring.
  *  @param[out] J  [residuals] > 0
  *  Cost: taps x residuals x width multiplications. */
-void hg_hull_step(hg_hull *self, const hg_radii *ring, hg_real *J);
+void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J);
 
 /** Has the initial state become a small part of J? */
 bool hg_hull_ready(const hg_hull *self);

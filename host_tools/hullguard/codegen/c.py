@@ -13,7 +13,8 @@ import numpy as np
 
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.design import Design
-from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, SignalTable, Tables
+from hullguard.design.bank_table import BankTable
+from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, PredictTable, SignalTable, Tables
 from hullguard.errors import InputError
 
 WIDTH = 140  # columns
@@ -127,7 +128,7 @@ def _limits(tables: Tables) -> list[str]:
         ("HG_GROUPS_MAX", len(tables.groups)),
         ("HG_GROUP_SIGNALS_MAX", max(len(g.signals) for g in tables.groups)),
         ("HG_LEVELS_MAX", max(g.levels for g in tables.groups)),
-        ("HG_GENERATORS_MAX", len(tables.generators)),
+        ("HG_GENERATORS_MAX", tables.judged),
     )
     lines = []
     for macro, least in needed:
@@ -136,28 +137,22 @@ def _limits(tables: Tables) -> list[str]:
     return [*lines, ""] if lines else []
 
 
-def detector_reals(tables: Tables) -> int:
-    """hg_detector_reals(), evaluated here so that the storage has exactly that length."""
-    own = sum(2 * len(g.state) + len(g.signal) for g in tables.generators)
-    return 3 * tables.signals + 2 * tables.residuals + tables.signals * tables.history + own
-
-
 def _storage(tables: Tables) -> list[str]:
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
     codes, closing = max(2 * tables.signals, 1), max(len(tables.groups[tables.closing].signals), 1)
-    generators = len(tables.generators)
+    own = (("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), ("hg_hull", "hull", len(tables.generators)))
+    own += (("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums))
     return [
         "/* Memory of one detector node. */",
         "typedef struct {",
         "    hg_node     node;",
         f"    hg_hold     hold[{prefix}_GROUPS];",
-        f"    hg_residual residual[{generators}];",
-        f"    hg_hull     hull[{generators}];",
-        f"    hg_alarm    alarm[{generators}];",
+        *(f"    {kind:<11} {name}[{count}];" for kind, name, count in own if count),
+        f"    hg_alarm    alarm[{tables.judged}];",
         f"    hg_link     link[{prefix}_GROUPS];",
         f"    int32_t     code[{codes}];",
         f"    int32_t     closing[{closing}];",
-        f"    hg_real     real[{detector_reals(tables)}];",
+        f"    hg_real     real[{tables.reals}];",
         f"}} {t}_node;",
         "",
         "/** Start a detector node; self->node is then ready for hg_node_receive().",
@@ -325,7 +320,7 @@ def _groups(tables: Tables, names: Names) -> list[str]:
 
 
 def _taps(g: GeneratorTable, n: str) -> list[str]:
-    shape = f"{n}_weight [{g.taps}][{len(g.output)}][{len(g.signal)}]"
+    shape = f"{n}_weight [{g.taps}][{len(g.output)}][{len(g.wide)}]"
     lines = [*comment(f"{shape}: magnitude of the impulse response, residual units a signal unit, by lag, residual and signal")]
     lines.append(f"static const hg_real {n}_weight[] = {{")
     for lag, rows in enumerate(g.weight):
@@ -338,6 +333,9 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     order, width, residuals = len(g.state), len(g.signal), len(g.output)
     lines = [f"/* ---- Residual generator {n.removeprefix('generator')} ---- */", ""]
     lines += table("uint8_t", f"{n}_signal", f"{width}", [unsigned(g.signal)], "places of the signals it reads: " + ", ".join(signals[i] for i in g.signal))
+    if g.wide != g.signal:
+        about = "places of the radii that its threshold adds up: " + ", ".join(signals[i] for i in g.wide)
+        lines += table("uint8_t", f"{n}_wide", f"{len(g.wide)}", [unsigned(g.wide)], about)
     for part, cols, about in (("state", order, "next state from state"), ("input", width, "next state from signals")):
         lines += table("hg_real", f"{n}_{part}", f"{order}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
     for part, cols, about in (("output", order, "residual from state"), ("direct", width, "residual from signals")):
@@ -346,13 +344,98 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
         rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {start}"
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
-    lines += table("hg_real", f"{n}_tail_input", f"{width}", [reals(g.tail_input)], "weight of a radius older than the taps")
+    lines += table("hg_real", f"{n}_tail_input", f"{len(g.wide)}", [reals(g.tail_input)], "weight of a radius older than the taps")
     lines += table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")
     return lines
 
 
+def _matrix(field: str, n: str, rows: Sequence[Sequence[float]]) -> str:
+    return f"{field} = {{.rows = {len(rows)}U, .cols = {len(rows[0])}U, .exponent = 0, .data = {n}_{field.removeprefix('.')}}}"
+
+
+def _predictors(tables: Tables, signals: Sequence[str]) -> list[str]:
+    lines: list[str] = []
+    entries: list[str] = []
+    for i, p in enumerate(tables.predictors):
+        n = f"predict{i + 1}"
+        order, width, inputs = len(p.state), len(p.output), len(p.input)
+        lines += [f"/* ---- Prediction of group {tables.groups[p.group].name} ---- */", ""]
+        lines += table("uint8_t", f"{n}_input", f"{inputs}", [unsigned(p.input)], "places of the inputs: " + ", ".join(signals[g] for g in p.input))
+        lines += table("hg_real", f"{n}_known", f"{inputs}", [reals(p.known)], "radius up to which an input is known, signal units")
+        parts = (("correct", width, "correction of the state from a frame's innovation"), ("state", order, "next state from state"), ("drive", inputs, "next state from inputs"))
+        parts += (("output", order, "values from state"), ("direct", inputs, "values from inputs"))
+        for part, cols, about in parts:
+            matrix = getattr(p, part)
+            lines += table("hg_real", f"{n}_{part}", f"{len(matrix)}][{cols}", [reals(r) for r in matrix], f"{about}, row-major")
+        lines += table("hg_real", f"{n}_fresh", f"{width}", [reals(p.fresh)], "radius in the sample of a frame, signal units")
+        lines += table("hg_real", f"{n}_radius", f"{len(p.radius)}][{width}", [reals(r) for r in p.radius], "error of the prediction 1, 2, .. samples after it, signal units")
+        entries += [
+            f"    {{.group = {p.group}U, .first = {p.first}U, .order = {order}U, .width = {width}U, .inputs = {inputs}U,",
+            f"     .input = {n}_input, .known = {n}_known,",
+            *(f"     {_matrix('.' + part, n, getattr(p, part))}," for part, _, _ in parts),
+            f"     .fresh = {n}_fresh, .horizon = {len(p.radius)}U, .radius = {n}_radius,",
+            f"     .settle = {p.settle}U}},",
+        ]
+    if not entries:
+        return []
+    return [*lines, *comment(f"predict [{len(tables.predictors)}]: what the plant's model says between frames"), "static const hg_predict_config predict[] = {", *entries, "};", ""]
+
+
+def _mismatch(m: MismatchTable | None, signals: Sequence[str]) -> list[str]:
+    if m is None:
+        return []
+    states, width = len(m.constant), len(m.signal)
+    lines = ["/* ---- What the uncertain plant may do beyond its nominal model ---- */", ""]
+    lines += table("uint8_t", "mismatch_signal", f"{width}", [unsigned(m.signal)], "places of the signals: " + ", ".join(signals[g] for g in m.signal))
+    lines += table("hg_real", "mismatch_constant", f"{states}", [reals(m.constant)], "state units")
+    lines += table("hg_real", "mismatch_gain", f"{states}][{width}", [reals(r) for r in m.gain], "state units a signal unit")
+    return [
+        *lines,
+        f"static const hg_mismatch_config mismatch = {{.states = {states}U, .width = {width}U, .signal = {present('mismatch_signal', m.signal)},",
+        f"                                            .constant = mismatch_constant, .gain = {present('mismatch_gain', m.signal)}}};",
+        "",
+    ]
+
+
+def _lags(name: str, about: str, window: Sequence[Sequence[Sequence[float]]]) -> list[str]:
+    """A table by lag, signal and certificate; nothing for an empty one."""
+    if not window or not window[0]:
+        return []
+    lines = [*comment(f"{name} [{len(window)}][{len(window[0])}][{len(window[0][0])}]: {about}, by lag, signal and certificate"), f"static const hg_real {name}[] = {{"]
+    for lag, rows in enumerate(window):
+        lines.append(f"    /* lag {lag} */")
+        lines += [line for row in rows for line in fill(reals(row))]
+    return [*lines, "};", ""]
+
+
+def _bank(b: BankTable, n: str, signals: Sequence[str]) -> list[str]:
+    lines = [f"/* ---- Bank of certificates {n.removeprefix('bank')} ---- */", ""]
+    lines += table("uint8_t", f"{n}_signal", f"{len(b.signal)}", [unsigned(b.signal)], "places of the signals it reads: " + ", ".join(signals[i] for i in b.signal))
+    lines += _lags(f"{n}_weight", "certificates, residual units a signal unit", b.weight)
+    lines += table("uint8_t", f"{n}_extra", f"{len(b.extra)}", [unsigned(b.extra)] if b.extra else [], "places of the radii that are added besides")
+    lines += _lags(f"{n}_extra_weight", "residual units a signal unit", b.extra_weight)
+    return lines + table("hg_real", f"{n}_bias", f"{b.certificates}", [reals(b.bias)], "threshold's part from disturbance and rounding")
+
+
+def _banks(tables: Tables, signals: Sequence[str]) -> list[str]:
+    if not tables.banks:
+        return []
+    lines = [line for i, b in enumerate(tables.banks) for line in _bank(b, f"bank{i + 1}", signals)]
+    lines += [*comment(f"bank [{len(tables.banks)}]: the banks of certificates"), "static const hg_bank_config bank[] = {"]
+    for i, b in enumerate(tables.banks):
+        n = f"bank{i + 1}"
+        lines += [
+            f"    {{.certificates = {b.certificates}U, .window = {b.window}U, .width = {len(b.signal)}U, .signal = {n}_signal, .weight = {n}_weight,",
+            f"     .extras = {len(b.extra)}U, .extra = {present(n + '_extra', b.extra)}, .extra_weight = {present(n + '_extra_weight', b.extra)},",
+            f"     .bias = {n}_bias, .widen = {real(b.widen)}}},",
+        ]
+    return [*lines, "};", ""]
+
+
 def _generators(tables: Tables) -> list[str]:
     count = len(tables.generators)
+    if count == 0:
+        return []
     lines = [*comment(f"residual [{count}]: the residual generators"), "static const hg_residual_config residual[] = {"]
     for i, g in enumerate(tables.generators):
         n, order, width, residuals = f"generator{i + 1}", len(g.state), len(g.signal), len(g.output)
@@ -367,26 +450,35 @@ def _generators(tables: Tables) -> list[str]:
     for i, g in enumerate(tables.generators):
         n = f"generator{i + 1}"
         lines += [
-            f"    {{.residuals = {len(g.output)}U, .width = {len(g.signal)}U, .signal = {n}_signal, .taps = {g.taps}U, .weight = {n}_weight,",
+            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'}, .taps = {g.taps}U, .weight = {n}_weight,",
             f"     .settle = {g.settle}U, .rest = {n}_rest, .moving = {n}_moving, .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U,",
             f"     .decay = {real(g.decay)}, .tail_input = {n}_tail_input, .tail_output = {n}_tail_output}},",
         ]
-    lines += ["};", ""]
-    lines += table("uint8_t", "feeds", f"{count}", [[f"0x{g.feeds:02X}U" for g in tables.generators]], "groups that feed a generator, bit i: group i")
-    lines += table("uint32_t", "moved_by", f"{count}", [[f"0x{g.faults:X}UL" for g in tables.generators]], "faults that move a generator, bit i: fault i")
-    return lines
+    return [*lines, "};", ""]
+
+
+def _judged(tables: Tables) -> list[str]:
+    judged, count = [*tables.generators, *tables.banks], tables.judged
+    lines = table("uint8_t", "feeds", f"{count}", [[f"0x{g.feeds:02X}U" for g in judged]], "groups that feed a generator or a bank, bit i: group i")
+    about = "faults that can explain an alarm of a generator or a bank, bit i: fault i"
+    return lines + table("uint32_t", "moved_by", f"{count}", [[f"0x{g.faults:X}UL" for g in judged]], about)
 
 
 def _node(design: Design) -> list[str]:
     tables = design.tables
     t, prefix, count = f"hg_{tables.name}", f"HG_{tables.name.upper()}", len(tables.generators)
+    predict, mismatch = present("predict", tables.predictors), "&mismatch" if tables.mismatch else "NULL"
+    own, bank = (("residual", "hull") if count else ("NULL", "NULL")), present("bank", tables.banks)
     lines = [
         "/* detector: the whole of it */",
         "static const hg_detector_config detector = {",
-        f"    .signals = {prefix}_SIGNALS, .groups = {prefix}_GROUPS, .hold = hold, .generators = {count}U, .residual = residual, .hull = hull,",
-        f"    .decision = {{.generators = {count}U, .feeds = feeds, .faults = moved_by,",
+        f"    .signals = {prefix}_SIGNALS, .width = {tables.width}U, .groups = {prefix}_GROUPS, .hold = hold,",
+        f"    .predictors = {len(tables.predictors)}U, .predict = {predict}, .mismatch = {mismatch},",
+        f"    .generators = {count}U, .residual = {own[0]}, .hull = {own[1]}, .banks = {len(tables.banks)}U, .bank = {bank},",
+        f"    .decision = {{.generators = {tables.judged}U, .feeds = feeds, .faults = moved_by,",
         f"                 .up = {tables.up}U, .down = {tables.down}U, .latch = {boolean(tables.latch)}}},",
-        f"    .history = {tables.history}U, .residuals = {tables.residuals}U, .codes = {2 * tables.signals}U, .reals = {detector_reals(tables)}UL,",
+        f"    .history = {tables.history}U, .window = {tables.window}U, .residuals = {tables.residuals}U,",
+        f"    .codes = {2 * tables.signals}U, .reals = {tables.reals}UL, .sums = {tables.sums}UL,",
         "};",
         "",
     ]
@@ -412,6 +504,9 @@ def _node(design: Design) -> list[str]:
 def _starts(tables: Tables) -> list[str]:
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
     first = ", ".join(f"{2 * g.first}U" for g in tables.groups)
+    generators, banks = tables.generators, tables.banks
+    parts = (("predict", tables.predictors), ("residual", generators), ("hull", generators), ("bank", banks), ("sum", banks))
+    own = [f"self->{name}" if there else "NULL" for name, there in parts]
     return [
         f"hg_status {t}_node_start({t}_node *self, hg_start how)",
         "{",
@@ -419,8 +514,9 @@ def _starts(tables: Tables) -> list[str]:
         "        return HG_E_ARGUMENT;",
         "    }",
         "    const hg_node_memory memory = {",
-        "        .detector = {.hold = self->hold, .residual = self->residual, .hull = self->hull, .alarm = self->alarm,",
-        f"                     .code = self->code, .codes = {2 * tables.signals}U, .real = self->real, .reals = {detector_reals(tables)}UL}},",
+        f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .bank = {own[3]},",
+        f"                     .alarm = self->alarm, .code = self->code, .codes = {2 * tables.signals}U, .real = self->real, .reals = {tables.reals}UL,",
+        f"                     .sum = {own[4]}, .sums = {tables.sums}UL}},",
         "        .link = self->link,",
         "        .closing = self->closing,",
         "    };",
@@ -439,6 +535,12 @@ def _starts(tables: Tables) -> list[str]:
     ]
 
 
+def derived_names(tables: Tables, names: Names) -> list[str]:
+    """Of the derived signals: predicted ones, then uncertain states."""
+    predicted = [f"predicted {names.signals[p.first + g]}" for p in tables.predictors for g in range(len(p.output))]
+    return predicted + [f"mismatch {i + 1}" for i in range(len(tables.mismatch.constant) if tables.mismatch else 0)]
+
+
 def _source(design: Design, names: Names) -> str:
     tables = design.tables
     lines = [*banner(design, "its tables."), f'#include "{tables.name}.h"', "", "#include <stddef.h>", ""]
@@ -446,8 +548,10 @@ def _source(design: Design, names: Names) -> str:
         lines += _group(g, n)
     lines += ["/* ---- All groups ---- */", "", *_groups(tables, names)]
     for i, generator in enumerate(tables.generators):
-        lines += _generator(generator, f"generator{i + 1}", names.signals)
-    lines += ["/* ---- All generators ---- */", "", *_generators(tables), "/* ---- Node ---- */", "", *_node(design)]
+        lines += _generator(generator, f"generator{i + 1}", [*names.signals, *derived_names(tables, names)])
+    derived = [*names.signals, *derived_names(tables, names)]
+    lines += [*_predictors(tables, names.signals), *_mismatch(tables.mismatch, names.signals), *_banks(tables, derived)]
+    lines += ["/* ---- All generators and banks ---- */", "", *_generators(tables), *_judged(tables), "/* ---- Node ---- */", "", *_node(design)]
     lines += _starts(tables)
     return "\n".join(lines) + "\n"
 

@@ -148,7 +148,7 @@ const hgh_result *hgh_run_result(const hgh_run *self);
 /** Put other faults in place from here on, and forget what was found so far. */
 void hgh_run_inject(hgh_run *self, const hgh_fault *fault, int32_t count);
 
-/* What the last step saw: [signals] readings, held values, radii; [residuals] r and J. */
+/* What the last step saw: [signals] readings; [width] held and derived values, and radii; [residuals] r and J. */
 typedef struct {
     const double *reading;
     const double *value;

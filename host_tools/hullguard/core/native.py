@@ -107,25 +107,54 @@ class Native:
     def _detector(self, holds: Any) -> Any:
         t = self.tables
         count = len(t.generators)
-        residuals, hulls = self._new("hg_residual_config[]", count), self._new("hg_hull_config[]", count)
+        residuals, hulls = self._new("hg_residual_config[]", count or 1), self._new("hg_hull_config[]", count or 1)
         for i, g in enumerate(t.generators):
             self._generator(residuals[i], hulls[i], g)
         d = self._new("hg_detector_config *")
-        d.signals, d.groups, d.hold = t.signals, len(t.groups), holds
+        d.signals, d.width, d.groups, d.hold = t.signals, t.width, len(t.groups), holds
         d.generators, d.residual, d.hull = count, residuals, hulls
-        d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = count, t.up, t.down, t.latch
-        d.decision.feeds = self._ints("uint8_t", [g.feeds for g in t.generators])
-        d.decision.faults = self._ints("uint32_t", [g.faults for g in t.generators])
-        d.history, d.residuals, d.codes = t.history, t.residuals, 2 * t.signals
-        d.reals = self.library.lib.hg_detector_reals(d)
+        self._derived(d)
+        self._banks(d)
+        d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = t.judged, t.up, t.down, t.latch
+        judged = [*t.generators, *t.banks]
+        d.decision.feeds = self._ints("uint8_t", [g.feeds for g in judged])
+        d.decision.faults = self._ints("uint32_t", [g.faults for g in judged])
+        d.history, d.window, d.residuals, d.codes = t.history, t.window, t.residuals, 2 * t.signals
+        d.reals, d.sums = self.library.lib.hg_detector_reals(d), self.library.lib.hg_detector_sums(d)
         return d
 
+    def _derived(self, d: Any) -> None:
+        t = self.tables
+        predict = self._new("hg_predict_config[]", len(t.predictors) or 1)
+        for p, table in zip(predict, t.predictors, strict=False):
+            p.group, p.first, p.order, p.width, p.inputs = table.group, table.first, len(table.state), len(table.output), len(table.input)
+            p.input, p.known = self._ints("uint8_t", table.input), self._reals(table.known)
+            for place, matrix in ((p.correct, table.correct), (p.state, table.state), (p.drive, table.drive), (p.output, table.output), (p.direct, table.direct)):
+                self._matrix(place, matrix)
+            p.fresh, p.horizon, p.radius, p.settle = self._reals(table.fresh), len(table.radius), self._reals(table.radius), table.settle
+        d.predictors, d.predict = len(t.predictors), predict
+        if t.mismatch is not None:
+            m = self._new("hg_mismatch_config *")
+            m.states, m.width, m.signal = len(t.mismatch.constant), len(t.mismatch.signal), self._ints("uint8_t", t.mismatch.signal)
+            m.constant, m.gain = self._reals(t.mismatch.constant), self._reals(t.mismatch.gain)
+            d.mismatch = m
+
+    def _banks(self, d: Any) -> None:
+        t = self.tables
+        banks = self._new("hg_bank_config[]", len(t.banks) or 1)
+        for b, table in zip(banks, t.banks, strict=False):
+            b.certificates, b.window, b.width = table.certificates, table.window, len(table.signal)
+            b.signal, b.weight, b.bias, b.widen = self._ints("uint8_t", table.signal), self._reals(table.weight), self._reals(table.bias), table.widen
+            b.extras, b.extra = len(table.extra), self._ints("uint8_t", table.extra)
+            b.extra_weight = self._reals(table.extra_weight)
+        d.banks, d.bank = len(t.banks), banks
+
     def _generator(self, r: Any, h: Any, g: GeneratorTable) -> None:
-        signal = self._ints("uint8_t", g.signal)
+        signal, wide = self._ints("uint8_t", g.signal), self._ints("uint8_t", g.wide)
         r.order, r.residuals, r.width, r.signal = len(g.state), len(g.output), len(g.signal), signal
         for place, table in ((r.state, g.state), (r.input, g.input), (r.output, g.output), (r.direct, g.direct)):
             self._matrix(place, table)
-        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.signal), signal, g.taps
+        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), wide, g.taps
         h.weight, h.settle, h.rest, h.moving = self._reals(g.weight), g.settle, self._reals(g.rest), self._reals(g.moving)
         h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, g.decay
         h.tail_input, h.tail_output = self._reals(g.tail_input), self._reals(g.tail_output)
@@ -173,17 +202,20 @@ class Node:
         self.native = native
         lib, ffi, t = native.library.lib, native.library.ffi, native.tables
         self._lib, self._ffi = lib, ffi
-        groups, count = len(t.groups), len(t.generators)
-        d = native.node.detector
+        groups, d = len(t.groups), native.node.detector
         memory = ffi.new("hg_node_memory *")
-        self._keep = [memory] + [ffi.new(f"{kind}[]", n) for kind, n in (("hg_hold", groups), ("hg_residual", count), ("hg_hull", count), ("hg_alarm", count))]
-        memory.detector.hold, memory.detector.residual, memory.detector.hull, memory.detector.alarm = self._keep[1:5]
-        code, real = ffi.new("int32_t[]", max(2 * t.signals, 1)), ffi.new("hg_real[]", d.reals)
-        link, closing = ffi.new("hg_link[]", groups), ffi.new("int32_t[]", len(t.groups[t.closing].signals) + 1)
-        self._keep += [code, real, link, closing]
-        memory.detector.code, memory.detector.codes = code, d.codes
-        memory.detector.real, memory.detector.reals = real, d.reals
-        memory.link, memory.closing = link, closing
+        self._keep: list[Any] = [memory]
+
+        def room(kind: str, count: int) -> Any:
+            self._keep.append(ffi.new(f"{kind}[]", count or 1))
+            return self._keep[-1]
+
+        own = memory.detector
+        own.hold, own.predict, own.alarm = room("hg_hold", groups), room("hg_predict", len(t.predictors)), room("hg_alarm", t.judged)
+        own.residual, own.hull, own.bank = room("hg_residual", len(t.generators)), room("hg_hull", len(t.generators)), room("hg_bank", len(t.banks))
+        own.code, own.codes, own.real, own.reals = room("int32_t", 2 * t.signals), d.codes, room("hg_real", d.reals), d.reals
+        own.sum, own.sums = room("hg_acc", d.sums), d.sums
+        memory.link, memory.closing = room("hg_link", groups), room("int32_t", len(t.groups[t.closing].signals) + 1)
         self.node = ffi.new("hg_node *")
         status = lib.hg_node_start(self.node, native.node, memory, start)
         if status != lib.HG_OK:
@@ -452,7 +484,7 @@ class Batch:
         return [{name: getattr(results[i], name) for name in RESULT} | {"run": first + i} for i in range(count)]
 
     def trace(self, run: int = 0) -> dict[str, Array]:
-        """One run sample by sample: reading, value, radius (samples x signals), r, J (samples x residuals), events, plant, bus, bits."""
+        """One run sample by sample: reading (samples x signals), value, radius (samples x width), r, J (samples x residuals), events, plant, bus, bits."""
         lib, ffi, t = self._native.library.lib, self._native.library.ffi, self._native.tables
         made = lib.hgh_run_new(self.config, run)
         if made == ffi.NULL:
@@ -463,8 +495,9 @@ class Batch:
             while more:
                 more = lib.hgh_run_steps(made, 1)
                 view = lib.hgh_run_view(made)
-                for name in ("reading", "value", "radius"):
-                    rows[name].append(ffi.unpack(getattr(view, name), t.signals))
+                rows["reading"].append(ffi.unpack(view.reading, t.signals))
+                for name in ("value", "radius"):
+                    rows[name].append(ffi.unpack(getattr(view, name), t.width))
                 for name in ("r", "J"):
                     rows[name].append(ffi.unpack(getattr(view, name), t.residuals))
                 for name in ("events", "plant", "bus", "bits"):

@@ -19,7 +19,7 @@ struct hgh_run {
     hg_verdict     verdict;
     hg_node        node;
     hg_sender      sender[HG_GROUPS_MAX];
-    double         reading[HGH_SIGNALS_MAX], value[HGH_SIGNALS_MAX], radius[HGH_SIGNALS_MAX];
+    double         reading[HGH_SIGNALS_MAX], value[UINT8_MAX], radius[UINT8_MAX]; /* the last two of the whole signal vector */
     double        *r, *J;
 };
 
@@ -42,13 +42,17 @@ static hg_node_memory node_memory(arena *a, const hg_node_config *node)
     const hg_detector_config *d = node->detector;
     hg_node_memory m;
     m.detector.hold = take(a, d->groups, sizeof(hg_hold));
+    m.detector.predict = take(a, d->predictors, sizeof(hg_predict));
     m.detector.residual = take(a, d->generators, sizeof(hg_residual));
     m.detector.hull = take(a, d->generators, sizeof(hg_hull));
-    m.detector.alarm = take(a, d->generators, sizeof(hg_alarm));
+    m.detector.bank = take(a, d->banks, sizeof(hg_bank));
+    m.detector.alarm = take(a, (size_t)d->generators + d->banks, sizeof(hg_alarm));
     m.detector.codes = (uint16_t)(2U * d->signals);
     m.detector.code = take(a, m.detector.codes, sizeof(int32_t));
     m.detector.reals = hg_detector_reals(d);
     m.detector.real = take(a, m.detector.reals, sizeof(hg_real));
+    m.detector.sums = hg_detector_sums(d);
+    m.detector.sum = take(a, m.detector.sums, sizeof(hg_acc));
     m.link = take(a, d->groups, sizeof(hg_link));
     m.closing = take(a, (size_t)node->message[node->closing].width + 1U, sizeof(int32_t));
     return m;
@@ -271,7 +275,7 @@ const hgh_result *hgh_run_result(const hgh_run *self)
 hgh_view hgh_run_view(hgh_run *self)
 {
     const hg_detector *d = &self->node.detector;
-    for (int32_t i = 0; i < self->config.signals; i++) {
+    for (uint8_t i = 0U; i < d->config->width; i++) {
         self->value[i] = (double)d->value[i];
         self->radius[i] = (double)d->radius[i];
     }

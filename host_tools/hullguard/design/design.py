@@ -16,13 +16,15 @@ from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, ch
 from hullguard.design.reach import reach
 from hullguard.design.search import FaultPath, between_events, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
-from hullguard.design.tables import GeneratorTable, GroupTable, Tables, group_table, message_table, rows
+from hullguard.design.predict import Bounds, predict_table, predicted_groups
+from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows
 from hullguard.errors import InputError
 from hullguard.model.plant import Feedback
 from hullguard.model.schema import Model, Observer
 from hullguard.model.table import Array
 
 Tick = Callable[[str, int, int], None]  # what is being done, step, of how many
+SEEN = 1e9  # a fault that would have to be larger than this does not move a generator
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class Generator:
     filter: PostFilter
     linear: hull.Linear
     tables: hull.HullTables
-    radius: Array  # width: usual radii of its signals
+    signal: tuple[int, ...]  # places of its signals
+    radius: Array  # usual radii of its signals, then of the uncertain states
     smallest: Array  # faults of the spec
     blind: Array  # the same with a post-filter that does not know of the trigger
 
@@ -192,10 +195,10 @@ def finish(model: Model, stored: Stored) -> Design:
     if stored.gain is not None and plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(stored.gain, plant.feedback.reference_bound))
     model = replace(model, plant=plant)
-    radius = usual_radius(model)
     groups = tuple(group_table(model, g, stored.slew) for g in model.groups)
-    generators = tuple(_generator(model, i, stored, radius) for i in range(len(model.observers)))
-    tables = _tables(model, groups, generators)
+    derived = _derived(model, stored, groups)
+    generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers)))
+    tables = _tables(model, groups, generators, derived)
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
@@ -222,8 +225,39 @@ def _largest(model: Model, stored: Stored, place: int) -> float:
     return min(declared, reached + abs(model.centre(place)) + s.resolution)
 
 
-def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator:
+@dataclass(frozen=True)
+class Derived:
+    """The signals that the detector computes from the sent ones, and what the radii usually are."""
+
+    predictors: tuple[PredictTable, ...]
+    place: dict[int, int]  # of a sent signal: where its tighter twin is
+    mismatch: MismatchTable | None
+    uncertain: tuple[int, ...]  # places of the uncertain states' radii
+    states: tuple[int, ...]  # and the states
+    usual: Array  # width: of the whole vector
+    largest: Array  # uncertain states: radius at most
+
+
+def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> Derived:
+    usual = usual_radius(model)
+    width, place = len(model.signals), {}
+    inputs = np.array([_largest(model, stored, i) for i in model.inputs])
+    bounds = Bounds(stored.state_range, inputs, np.zeros(model.plant.n))
+    predictors = tuple(predict_table(model, i, groups, bounds) for i in predicted_groups(model)) if model.detector.prediction else ()
+    for p in predictors:
+        for n in range(len(p.output)):
+            place[p.first + n] = width + n
+        # Between events a signal is as old as half its longest interval, when nothing is known of its motion.
+        middle = p.radius[(groups[p.group].interval_max - 1) // 2]
+        usual = np.concatenate([usual, np.minimum(usual[p.first : p.first + len(p.output)], middle)])
+        width += len(p.output)
+    return Derived(predictors, place, None, (), (), usual, np.zeros(0))
+
+
+def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Generator:
     spec, found = model.observers[i], stored.observers[i]
+    outputs, inputs = [model.outputs[k] for k in spec.outputs], [model.inputs[k] for k in spec.inputs]
+    radius = derived.usual[: len(model.signals)].copy()
     sub = sub_plant(model, spec, radius)
     G, H, L, T = structure(sub, found.v, found.gamma)
     o = ObserverMatrices(found.v, found.gamma, G, H, L, T, found.W, found.V, found.V @ sub.D)
@@ -231,55 +265,66 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     f = replace(solved, Lo=found.Lo, Mo=found.Mo)
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
-    outputs, inputs = [model.outputs[k] for k in spec.outputs], [model.inputs[k] for k in spec.inputs]
     values = np.array([_largest(model, stored, k) for k in outputs + inputs])
-    ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :])
-    own = radius[outputs + inputs]
+    ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :], derived.largest)
+    signal = tuple(derived.place.get(k, k) for k in outputs + inputs)
+    own = derived.usual[list(signal + derived.uncertain)]
     longest = max(g.trigger.interval_max for g in model.groups)
-    table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]")
+    table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]", np.eye(plant.n)[:, list(derived.states)])
     paths = fault_paths(model, spec, spec.faults)
     blind = np.full(len(paths), np.inf)
     if paths and spec.filtered:
         try:
             plain = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, False)
-            blind = smallest_faults(sub, o, plain, paths, own)
+            blind = smallest_faults(sub, o, plain, paths, radius[outputs + inputs])
         except (np.linalg.LinAlgError, ValueError):
             pass  # without the event error the factorisation may not exist; then there is nothing to compare with
-    return Generator(spec, sub, o, f, linear, table, own, found.smallest, blind)
+    return Generator(spec, sub, o, f, linear, table, signal, own, found.smallest, blind)
 
 
-def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...]) -> Tables:
-    made = []
-    for g in generators:
-        signal = [model.outputs[k] for k in g.spec.outputs] + [model.inputs[k] for k in g.spec.inputs]
-        used = np.any(g.tables.weight > 0, axis=(0, 1)) | (g.tables.tail_input > 0)
-        feeds = sum(1 << i for i, group in enumerate(model.groups) if any(used[signal.index(s)] for s in group.signals if s in signal))
-        paths = fault_paths(model, g.spec, tuple(range(len(model.faults))))
-        size = smallest_faults(g.plant, g.observer, g.filter, paths, g.radius) if paths else np.zeros(0)
-        faults = sum(1 << i for i, s in enumerate(size) if s < 1e9)
-        made.append(
-            GeneratorTable(
-                signal=tuple(signal),
-                state=rows(g.linear.state),
-                input=rows(g.linear.input),
-                output=rows(g.linear.output),
-                direct=rows(g.linear.direct),
-                taps=g.tables.weight.shape[0],
-                weight=tuple(rows(w) for w in g.tables.weight),
-                settle=g.tables.rest.shape[0],
-                rest=rows(g.tables.rest),
-                moving=rows(g.tables.moving),
-                ready_rest=g.tables.ready_rest,
-                ready_moving=g.tables.ready_moving,
-                decay=g.tables.decay,
-                tail_input=tuple(float(x) for x in g.tables.tail_input),
-                tail_output=tuple(float(x) for x in g.tables.tail_output),
-                feeds=feeds,
-                faults=faults,
-            )
-        )
+def _feeds(model: Model, used: set[int]) -> int:
+    """Mask of the groups that send one of these signals."""
+    return sum(1 << i for i, group in enumerate(model.groups) if used & set(group.signals))
+
+
+def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorTable:
+    wide = g.signal + derived.uncertain
+    used = {wide[i] for i in np.flatnonzero(np.any(g.tables.weight > 0, axis=(0, 1)) | (g.tables.tail_input > 0))}
+    sent = {twin: place for place, twin in derived.place.items()}
+    if used & set(derived.uncertain) and derived.mismatch is not None:
+        used |= set(derived.mismatch.signal)
+    paths = fault_paths(model, g.spec, tuple(range(len(model.faults))))
+    size = smallest_faults(g.plant, g.observer, g.filter, paths, g.radius[: len(g.signal)]) if paths else np.zeros(0)
+    # A prediction is as wrong as the faulty plant, whichever fault it is: every fault may move what reads one.
+    predicted = bool(set(g.signal) & set(sent))
+    return GeneratorTable(
+        signal=g.signal,
+        wide=wide,
+        state=rows(g.linear.state),
+        input=rows(g.linear.input),
+        output=rows(g.linear.output),
+        direct=rows(g.linear.direct),
+        taps=g.tables.weight.shape[0],
+        weight=tuple(rows(w) for w in g.tables.weight),
+        settle=g.tables.rest.shape[0],
+        rest=rows(g.tables.rest),
+        moving=rows(g.tables.moving),
+        ready_rest=g.tables.ready_rest,
+        ready_moving=g.tables.ready_moving,
+        decay=g.tables.decay,
+        tail_input=tuple(float(x) for x in g.tables.tail_input),
+        tail_output=tuple(float(x) for x in g.tables.tail_output),
+        feeds=_feeds(model, {sent.get(i, i) for i in used}),
+        faults=sum(1 << i for i, s in enumerate(size) if s < SEEN or predicted),
+    )
+
+
+def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...], derived: Derived) -> Tables:
+    made = tuple(_generator_table(model, g, derived) for g in generators)
     verdict, status = message_table("verdict", model.verdict, 8), message_table("status", model.status, 8)
-    return Tables(model.name, groups, model.closing, tuple(made), model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat)
+    return Tables(
+        model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch
+    )
 
 
 def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, generators: tuple[Generator, ...]) -> list[Check]:

@@ -47,19 +47,20 @@ class Ranges:
     state: Array  # n: |x|
     value: Array  # signals: |v|
     input: Array  # p: |u|
+    derived: Array  # derived signals: their radius
 
 
 @dataclass(frozen=True)
 class HullTables:
-    """What hg_hull_config holds; weights in the order of [y; u]."""
+    """What hg_hull_config holds; weights in the order of [y; u], then of the derived signals that have a radius only."""
 
-    weight: Array  # taps x residuals x width
+    weight: Array  # taps x residuals x width and derived
     rest: Array  # settle x residuals
     moving: Array  # settle x residuals
     ready_rest: int
     ready_moving: int
     decay: float
-    tail_input: Array  # width
+    tail_input: Array  # width and derived
     tail_output: Array  # residuals
     rounding: Array  # residuals: the part of the bias that is rounding
     steady: Array  # residuals: threshold at the expected radii
@@ -75,12 +76,16 @@ class Rounding:
     behind: Array  # residuals: what later lags can add for radii as wide as the ranges
 
 
-def _rounding(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, lags: int) -> Rounding:
-    """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius."""
+def _rounding(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int) -> Rounding:
+    """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius.
+
+    `more` (order x derived): how radii enter e that come with no value; nothing is rounded where they enter, only what they do to e later.
+    """
     s, width = lin.input.shape
     m = plant.C.shape[0]
     gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
     x, u, v = ranges.state[:, None], ranges.input[:, None], ranges.value[:, None]
+    widest = np.concatenate([2 * ranges.value, ranges.derived])[:, None]
     G, E, F, D = np.abs(lin.state), np.abs(lin.input), np.abs(lin.output), np.abs(lin.direct)
     Ly, Lu, Dy, Du = lin.input[:, :m], lin.input[:, m:], lin.direct[:, :m], lin.direct[:, m:]
     P = powers(np.eye(s), lin.state, lags)
@@ -92,16 +97,17 @@ def _rounding(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array,
     into_e += gamma * (mul(G, z) + mul(E, v))
     into_r += gamma * (mul(F, z) + mul(D, v))
     # The part that does: |e(k)| <= sum over j of |G^j E| radius(k-1-j), and the value's own radius.
-    into_z = np.array([np.abs(mul(p, lin.input)) for p in P])
-    per_step = np.concatenate([E[None], np.array([mul(G, w) for w in into_z])])[:lags]
+    none = np.zeros((s, more.shape[1]))
+    into_z = np.array([np.abs(np.hstack([mul(p, lin.input), mul(p, more)])) for p in P])
+    per_step = np.concatenate([np.hstack([E, none])[None], np.array([mul(G, w) for w in into_z])])[:lags]
     FP = np.array([np.abs(mul(lin.output, p)) for p in P])
-    weight = np.zeros((lags + 1, F.shape[0], width))
-    weight[0] = D
+    weight = np.zeros((lags + 1, F.shape[0], width + more.shape[1]))
+    weight[0, :, :width] = D
     weight[1:] = np.array([mul(F, w) for w in into_z])
     for i in range(lags):
         for r in range(F.shape[0]):
             weight[1 + i :, r] += (FP[i, r][None, :, None] * per_step[: lags - i]).sum(1)
-    return Rounding(into_e[:, 0], into_r[:, 0], gamma * weight, gamma * mul(weight[-1], 2 * v)[:, 0] * lags)
+    return Rounding(into_e[:, 0], into_r[:, 0], gamma * weight, gamma * mul(weight[-1], widest)[:, 0] * lags)
 
 
 @dataclass(frozen=True)
@@ -113,13 +119,16 @@ class Tail:
     output: Callable[[int], Array]  # taps -> residuals
 
 
-def _tail(lin: Linear) -> Tail:
-    """The bound of what lies behind the taps: by eigenvectors where there are enough of them, else by a power of G that contracts."""
+def _tail(lin: Linear, entering: Array) -> Tail:
+    """The bound of what lies behind the taps: by eigenvectors where there are enough of them, else by a power of G that contracts.
+
+    `entering` (order x signals) is how the radii enter e.
+    """
     values, vectors = np.linalg.eig(lin.state)
     # A double eigenvalue can come with columns that are no eigenvectors and yet do not look singular: both are checked.
     off = np.abs(lin.state @ vectors - vectors * values).max()
     if np.linalg.cond(vectors) < 1e6 and off < 1e-12 * (1 + np.abs(lin.state).max()):
-        into = np.abs(np.linalg.solve(vectors, lin.input.astype(complex))).max(0)
+        into = np.abs(np.linalg.solve(vectors, entering.astype(complex))).max(0)
         out = np.abs(lin.output @ vectors)
         return _rounded_tail(float(np.abs(values).max()), into, lambda taps: np.asarray(out @ np.abs(values) ** (taps - 1)))
     # With |G^q| = c < 1 every row of F G^(i + q n) is at most |F G^i| c^n.
@@ -132,7 +141,7 @@ def _tail(lin: Linear) -> Tail:
         F = powers(mul(lin.output, np.linalg.matrix_power(lin.state, taps - 1)), lin.state, q)
         return np.asarray((np.abs(F).sum(2) * (decay ** -np.arange(q))[:, None]).max(0))
 
-    return _rounded_tail(decay, np.abs(lin.input).max(0), rows)
+    return _rounded_tail(decay, np.abs(entering).max(0), rows)
 
 
 def _rounded_tail(decay: float, into: Array, out: Callable[[int], Array]) -> Tail:
@@ -152,8 +161,11 @@ def _taps(share: Array, constant: Array, tail: Tail, radius: Array, least: int) 
     return TAPS_MAX
 
 
-def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array, interval_max: int, where: str) -> HullTables:
-    """All tables of one generator. `radius` (width) is what the signals' radii usually are."""
+def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array, interval_max: int, where: str, derived: Array | None = None) -> HullTables:
+    """All tables of one generator. `radius` (width and derived) is what the radii usually are.
+
+    `derived` (n x derived signals): how derived signals that have a radius only disturb the state.
+    """
     spectral = float(np.abs(np.linalg.eigvals(lin.state)).max())
     if spectral >= 1.0 - 1e-6:
         raise InputError(f"{where}: a pole of the fused observer has magnitude {spectral:.6f}; poles must be inside the unit circle")
@@ -162,10 +174,13 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
         raise InputError(f"{where}: a pole of magnitude {spectral:.6f} is too slow for a threshold; choose poles further inside the unit circle")
     m = plant.C.shape[0]
     F = powers(lin.output, lin.state, length)
-    weights = np.concatenate([np.abs(lin.direct)[None], np.abs(np.array([mul(f, lin.input) for f in F]))])
+    more = mul(T, derived) if derived is not None else np.zeros((lin.state.shape[0], 0))
+    entering = np.hstack([lin.input, more])
+    at_lag_0 = np.hstack([lin.direct, np.zeros((F.shape[1], more.shape[1]))])
+    weights = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
-    loss = _rounding(lin, T, plant, ranges, Bd, min(length, LAGS_MAX))
+    loss = _rounding(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX))
     lags = loss.weight.shape[0]
     weights[:lags] += loss.weight
     steps = np.array([mul(np.abs(f), loss.into_e[:, None])[:, 0] for f in F])
@@ -177,9 +192,9 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
 
     share = (weights * radius).sum(2)
     # What rounding adds to the lags behind the taps is no impulse response: it goes into the constant, with radii as wide as the ranges.
-    tail = _tail(lin)
+    tail = _tail(lin, entering)
     taps = _taps(share, driven[-1], tail, radius, max(interval_max, 2))
-    at_once = at_once + loss.behind + mul(loss.weight[taps:].sum(0), 2 * ranges.value[:, None])[:, 0]
+    at_once = at_once + loss.behind + mul(loss.weight[taps:].sum(0), np.concatenate([2 * ranges.value, ranges.derived])[:, None])[:, 0]
     driven = np.concatenate([np.zeros((1, F.shape[1])), driven]) + at_once
     steady = driven[-1] + share.sum(0)
     limit = driven[-1] * (1 + 1e-9)

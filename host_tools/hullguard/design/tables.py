@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.design.arith import U32, nearest32, up32
+from hullguard.design.bank_table import BankTable
 from hullguard.design.ids import data_ids
 from hullguard.errors import InputError
 from hullguard.model.schema import Frame, Group, Model, Signal
@@ -71,10 +72,38 @@ class GroupTable:
 
 
 @dataclass(frozen=True)
+class PredictTable:
+    """hg_predict_config."""
+
+    group: int
+    first: int
+    input: tuple[int, ...]
+    known: tuple[float, ...]
+    correct: tuple[tuple[float, ...], ...]
+    state: tuple[tuple[float, ...], ...]
+    drive: tuple[tuple[float, ...], ...]
+    output: tuple[tuple[float, ...], ...]
+    direct: tuple[tuple[float, ...], ...]
+    fresh: tuple[float, ...]
+    radius: tuple[tuple[float, ...], ...]  # horizon x width
+    settle: int
+
+
+@dataclass(frozen=True)
+class MismatchTable:
+    """hg_mismatch_config."""
+
+    signal: tuple[int, ...]
+    constant: tuple[float, ...]
+    gain: tuple[tuple[float, ...], ...]  # states x signals
+
+
+@dataclass(frozen=True)
 class GeneratorTable:
     """hg_residual_config and hg_hull_config."""
 
     signal: tuple[int, ...]
+    wide: tuple[int, ...]  # the signals of the threshold: these, and derived ones that have a radius only
     state: tuple[tuple[float, ...], ...]
     input: tuple[tuple[float, ...], ...]
     output: tuple[tuple[float, ...], ...]
@@ -107,21 +136,51 @@ class Tables:
     verdict: MessageTable
     status: MessageTable
     heartbeat: int
+    predictors: tuple[PredictTable, ...] = ()
+    mismatch: MismatchTable | None = None
+    banks: tuple[BankTable, ...] = ()
 
     @property
     def signals(self) -> int:
-        """Length of the signal vector."""
+        """Signals that are sent."""
         return sum(len(g.signals) for g in self.groups)
+
+    @property
+    def width(self) -> int:
+        """Length of the signal vector: sent and derived signals."""
+        return self.signals + sum(len(p.output) for p in self.predictors) + (len(self.mismatch.constant) if self.mismatch else 0)
 
     @property
     def history(self) -> int:
         """Rows of the ring of radii."""
-        return max(g.taps for g in self.generators) + 1
+        return max([g.taps + 1 for g in self.generators] + [b.window for b in self.banks])
+
+    @property
+    def window(self) -> int:
+        """Rows of the ring of values."""
+        return max((b.window for b in self.banks), default=0)
+
+    @property
+    def judged(self) -> int:
+        """Residual generators and banks."""
+        return len(self.generators) + len(self.banks)
 
     @property
     def residuals(self) -> int:
-        """Residuals of all generators together."""
-        return sum(len(g.output) for g in self.generators)
+        """Residuals of all generators together, and one for each bank."""
+        return sum(len(g.output) for g in self.generators) + len(self.banks)
+
+    @property
+    def reals(self) -> int:
+        """hg_detector_reals(), evaluated here so that the generated storage has exactly that length."""
+        own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
+        own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
+        return 3 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
+
+    @property
+    def sums(self) -> int:
+        """hg_detector_sums()."""
+        return sum(2 * b.certificates for b in self.banks)
 
     @property
     def hash(self) -> int:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.errors import InputError
+from hullguard.model.detector import DetectorSpec, read_detector
 from hullguard.model.faults import FaultSpec, parse_fault
 from hullguard.model.plant import Plant, read_plant
 from hullguard.model.table import Array, Table
@@ -23,6 +24,7 @@ SCHEMA = 1
 NAME = re.compile(r"^[a-z][a-z0-9_]{0,30}$")
 SHIPPED = Path(__file__).resolve().parent.parent.parent / "models"
 GROUPS_MAX = 8
+GENERATORS_MAX = 32
 FAULTS_MAX = 16
 
 
@@ -146,6 +148,7 @@ class Model:
     signals: tuple[Signal, ...]
     groups: tuple[Group, ...]
     observers: tuple[Observer, ...]
+    detector: DetectorSpec
     verdict: Frame
     status: Frame
     heartbeat: int
@@ -289,7 +292,9 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     _unique([f.name for f in faults] + [s.name for s in signals], f"{path.name}: faults and signals")
     if len(faults) > FAULTS_MAX:
         raise InputError(f"{path.name}: {len(faults)} faults, the verdict frame has room for {FAULTS_MAX}")
-    observers = _read_observers(top.table("detector"), outputs, inputs, faults)
+    inner = top.table("detector")
+    detector = read_detector(inner)
+    observers = _read_observers(inner, outputs, inputs, faults, detector.bank is None)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     scenarios = _read_scenarios(top, path)
     network = top.table("network", optional=True)
@@ -308,6 +313,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         signals=signals,
         groups=groups,
         observers=observers,
+        detector=detector,
         verdict=verdict,
         status=status,
         heartbeat=heartbeat,
@@ -501,12 +507,10 @@ def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
     return Fault(name, places[0], kind)
 
 
-def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...]) -> tuple[Observer, ...]:
-    _later(t, "bank", "zonotope")
-    t.text("threshold", "exact", ["exact"])
-    t.text("number", "f32", ["f32", "f64"])
+def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...], needed: bool) -> tuple[Observer, ...]:
+    """`needed`: there is nothing else that detects."""
     observers = []
-    for o in t.tables("observers"):
+    for o in t.tables("observers", optional=not needed):
         chosen = {key: o.names(key, everything) for key, everything in (("outputs", outputs), ("inputs", inputs), ("faults", [f.name for f in faults]))}
         for key, known in (("outputs", outputs), ("inputs", inputs), ("faults", [f.name for f in faults])):
             for n in chosen[key]:
@@ -532,8 +536,8 @@ def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tup
             )
         )
         o.close()
-    if not 1 <= len(observers) <= 32:
-        raise t.error("observers", f"{len(observers)} residual generators; 1 .. 32 are possible")
+    if not int(needed) <= len(observers) <= GENERATORS_MAX:
+        raise t.error("observers", f"{len(observers)} residual generators; {int(needed)} .. {GENERATORS_MAX} are possible")
     t.close()
     return tuple(observers)
 

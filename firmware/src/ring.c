@@ -1,0 +1,45 @@
+#include "hullguard/ring.h"
+
+#include "hullguard/linalg.h"
+
+#include <stddef.h>
+
+hg_status hg_ring_start(hg_ring *self, uint8_t width, uint8_t length, hg_real *memory)
+{
+    if ((self == NULL) || (memory == NULL) || (width == 0U) || (length == 0U)) {
+        return HG_E_ARGUMENT;
+    }
+    self->data = memory;
+    self->width = width;
+    self->length = length;
+    hg_ring_reset(self);
+    return HG_OK;
+}
+
+void hg_ring_reset(hg_ring *self)
+{
+    self->newest = 0U;
+    for (uint32_t i = 0U; i < HG_RING_REALS(self->width, self->length); i++) {
+        self->data[i] = HG_REAL_ZERO;
+    }
+}
+
+hg_status hg_ring_push(hg_ring *self, const hg_real *row)
+{
+    if (!hg_linalg_finite(row, self->width)) {
+        return HG_E_NUMERIC;
+    }
+    self->newest = ((self->newest + 1U) < self->length) ? (uint8_t)(self->newest + 1U) : 0U;
+    hg_ring_rewrite(self, 0U, 0U, self->width, row);
+    return HG_OK;
+}
+
+void hg_ring_rewrite(hg_ring *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *part)
+{
+    if (lag < self->length) {
+        hg_real *row = hg_ring_row(self, lag);
+        for (uint8_t g = 0U; g < count; g++) {
+            row[first + g] = part[g];
+        }
+    }
+}
