@@ -11,7 +11,7 @@
 #define HGH_STATES_MAX 64
 #define HGH_SIGNALS_MAX 96
 #define HGH_DISTURBANCES_MAX 192
-#define HGH_FAULTS_MAX 16
+#define HGH_FAULTS_MAX 32
 
 typedef struct {
     uint64_t state;
