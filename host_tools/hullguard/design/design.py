@@ -16,7 +16,7 @@ from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, ch
 from hullguard.design.reach import reach
 from hullguard.design.search import FaultPath, between_events, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
-from hullguard.design.tables import GeneratorTable, GroupTable, Tables, group_table, message_table, rows
+from hullguard.design.tables import GeneratorTable, GroupTable, Tables, group_table, message_table, rows, verdict_table
 from hullguard.errors import InputError
 from hullguard.model.plant import Feedback
 from hullguard.model.schema import Model, Observer
@@ -101,6 +101,16 @@ def fault_paths(model: Model, spec: Observer, faults: tuple[int, ...]) -> list[F
     return paths
 
 
+def observed(sub: SubPlant, paths: list[FaultPath]) -> tuple[SubPlant, list[FaultPath]]:
+    """The states that the outputs depend on, and what moves them: in a long platoon a search has to look at nothing else."""
+    seen = np.any(sub.C, axis=0)
+    for _ in range(sub.A.shape[0]):
+        seen = seen | np.any(sub.A[seen], axis=0)
+    felt = np.any(sub.Ed[seen], axis=0) | np.any(sub.Fd, axis=0)
+    part = replace(sub, A=sub.A[np.ix_(seen, seen)], B=sub.B[seen], C=sub.C[:, seen], Ed=sub.Ed[np.ix_(seen, felt)], Fd=sub.Fd[:, felt])
+    return part, [FaultPath(p.into_x[seen], p.into_value) for p in paths]
+
+
 def _spoken(model: Model, spec: Observer) -> tuple[Array, Array]:
     """Radius of each signal of a generator when it has just been sent, and the places of those that are sent together with a faulty one."""
     places = [model.outputs[k] for k in spec.outputs] + [model.inputs[k] for k in spec.inputs]
@@ -145,7 +155,8 @@ def find(model: Model, tick: Tick) -> Stored:
         if not spec.filtered:
             best = between_events(sub, spec.order, paths, *_spoken(model, spec))
         else:
-            best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
+            seen, paths = observed(sub, paths)
+            best = search(seen, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
         o, f = best.observer, best.filter
         observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
     gain = plant.feedback.gain if plant.feedback is not None else None
@@ -278,7 +289,7 @@ def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Gene
                 faults=faults,
             )
         )
-    verdict, status = message_table("verdict", model.verdict, 8), message_table("status", model.status, 8)
+    verdict, status = verdict_table(model), message_table("status", model.status, 8)
     return Tables(model.name, groups, model.closing, tuple(made), model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.linalg
 
 from hullguard.errors import InputError
+from hullguard.model.builders import BUILDERS
 from hullguard.model.table import Array, Table
 
 
@@ -62,54 +63,20 @@ def zero_order_hold(A: Array, B: Array, sample_time_s: float) -> tuple[Array, Ar
     return M[:n, :n], M[:n, n:]
 
 
-def string_of_vehicles(table: Table) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    """A single-lane string (Levine and Athans 1966): speed deviations w_i and gap deviations g_(i,i+1); platoon, section 1.
-
-    dw_i/dt = -drag w_i + u_i      dg_(i,i+1)/dt = w_i - w_(i+1)
-    """
-    vehicles = table.whole("vehicles", 2, 20)
-    drag = table.number("drag_per_s", 0.0)
-    n = 2 * vehicles - 1
-    A, B = np.zeros((n, n)), np.zeros((n, vehicles))
-    states: list[str] = []
-    for i in range(vehicles):
-        A[2 * i, 2 * i], B[2 * i, i] = -drag, 1.0
-        states.append(f"speed{i + 1}_mps")
-        if i + 1 < vehicles:
-            A[2 * i + 1, 2 * i], A[2 * i + 1, 2 * i + 2] = 1.0, -1.0
-            states.append(f"gap{i + 1}{i + 2}_m")
-    return tuple(states), tuple(f"control{i + 1}_mps2" for i in range(vehicles)), A, B
-
-
-def car_following(table: Table) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    """Cars behind one another whose accelerations are measured: dv_i/dt = a_i, dg_i/dt = v_(i-1) - v_i; platoon, section 9."""
-    cars = table.whole("cars", 2, 20)
-    n = 2 * cars - 1
-    A, B = np.zeros((n, n)), np.zeros((n, cars))
-    states = ["speed1_mps"]
-    B[0, 0] = 1.0
-    for i in range(2, cars + 1):
-        speed, gap, ahead = 2 * i - 3, 2 * i - 2, max(2 * i - 5, 0)
-        states += [f"speed{i}_mps", f"gap{i}_m"]
-        B[speed, i - 1] = 1.0
-        A[gap, ahead], A[gap, speed] = 1.0, -1.0
-    return tuple(states), tuple(f"accel{i}_mps2" for i in range(1, cars + 1)), A, B
-
-
-BUILDERS = {"string_of_vehicles": string_of_vehicles, "car_following": car_following}
-
-
 def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[str, float], sample_time_s: float) -> Plant:
     """Read the [plant] table. `outputs` and `inputs` are signal names in the model's order; `noise` bounds sensor noise by signal."""
     if "builder" in table:
         name = table.text("builder", choices=sorted(BUILDERS))
-        states, names, A, B = BUILDERS[name](table)
+        builder = BUILDERS[name]
+        made = builder.make(table)
+        size = made.B.shape[1]
+        states, names = builder.states(size), builder.inputs(size)
         for signal in outputs:
             if signal not in states:
                 raise InputError(f"signal '{signal}': the builder {name} has no such state; it has {', '.join(states)}")
         if list(names) != inputs:
             raise InputError(f"inputs are {', '.join(inputs) or 'none'}: the builder {name} needs, in this order, {', '.join(names)}")
-        A, B = zero_order_hold(A, B, sample_time_s)
+        A, B = zero_order_hold(made.A, made.B, sample_time_s)
         C = np.eye(len(states))[[states.index(s) for s in outputs]]
         D = np.zeros((len(outputs), len(inputs)))
     else:
