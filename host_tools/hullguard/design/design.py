@@ -12,6 +12,7 @@ from hullguard.bus.bits import load_bound
 from hullguard.design import hull, store
 from hullguard.design.arith import digits
 from hullguard.design.checks import Check, generator_checks, refuse
+from hullguard.design.mismatch import disturbed, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
 from hullguard.design.reach import reach
 from hullguard.design.search import FaultPath, between_events, search, smallest_faults
@@ -139,11 +140,12 @@ def find(model: Model, tick: Tick) -> Stored:
     """All that needs a search or a solver, rounded for the design file."""
     check_observable(model)
     horizon = max(g.trigger.interval_max + g.trigger.margin for g in model.groups)
-    plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B))
+    plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B), dA=digits(model.plant.dA), dB=digits(model.plant.dB))
     if plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(digits(plant.feedback.gain), plant.feedback.reference_bound))
     model = replace(model, plant=plant)
     reached = reach(model, horizon)
+    model = _disturbed(model, reached.state, reached.signal)
     radius = usual_radius(model)
     observers = []
     for i, spec in enumerate(model.observers):
@@ -159,8 +161,9 @@ def find(model: Model, tick: Tick) -> Stored:
             best = search(seen, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
         o, f = best.observer, best.filter
         observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
+    spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
-    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), tuple(observers))
+    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), tuple(observers), *spread)
 
 
 def refilter(model: Model, old: Stored) -> Stored:
@@ -169,8 +172,9 @@ def refilter(model: Model, old: Stored) -> Stored:
     found = find(fresh, lambda *_: None)
     radius = usual_radius(model)
     observers = []
+    model = _disturbed(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), found.state_range, found.signal_reach)
     for spec, stored in zip(model.observers, old.observers, strict=True):
-        sub = sub_plant(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), spec, radius)
+        sub = sub_plant(model, spec, radius)
         G, H, L, T = structure(sub, stored.v, stored.gamma)
         f = no_filter(spec.order) if not spec.filtered else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
         observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
@@ -200,12 +204,15 @@ def stored_for(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
 def finish(model: Model, stored: Stored) -> Design:
     """Checks and tables from a model and its stored numbers: plain arithmetic."""
     plant = replace(model.plant, A=stored.A, B=stored.B)
+    if stored.dA is not None and stored.dB is not None:
+        plant = replace(plant, dA=stored.dA, dB=stored.dB)
     if stored.gain is not None and plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(stored.gain, plant.feedback.reference_bound))
     model = replace(model, plant=plant)
     radius = usual_radius(model)
     groups = tuple(group_table(model, g, stored.slew) for g in model.groups)
-    generators = tuple(_generator(model, i, stored, radius) for i in range(len(model.observers)))
+    bounded = _disturbed(model, stored.state_range, stored.signal_reach)
+    generators = tuple(_generator(bounded, i, stored, radius) for i in range(len(model.observers)))
     tables = _tables(model, groups, generators)
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
@@ -223,11 +230,16 @@ def _unique_ids(model: Model, tables: Tables) -> None:
                 raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{a.data_id[0]:02X}; give one another data_id")
 
 
-def _largest(model: Model, stored: Stored, place: int) -> float:
+def _disturbed(model: Model, state: Array, signal: Array) -> Model:
+    """The model with its intervals as a bounded disturbance. `state` (n) and `signal` (signals) are of its reach."""
+    return disturbed(model, state, np.array([_largest(model, signal, i) for i in range(len(model.signals))]))
+
+
+def _largest(model: Model, signal_reach: Array, place: int) -> float:
     """Largest magnitude of a healthy signal: what it can reach, or its declared range."""
     s = model.signals[place]
     declared = max(abs(s.low), abs(s.high))
-    reached = float(stored.signal_reach[place])
+    reached = float(signal_reach[place])
     if not np.isfinite(reached):
         return declared
     return min(declared, reached + abs(model.centre(place)) + s.resolution)
@@ -243,7 +255,7 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
     outputs, inputs = [model.outputs[k] for k in spec.outputs], [model.inputs[k] for k in spec.inputs]
-    values = np.array([_largest(model, stored, k) for k in outputs + inputs])
+    values = np.array([_largest(model, stored.signal_reach, k) for k in outputs + inputs])
     ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :])
     own = radius[outputs + inputs]
     longest = max(g.trigger.interval_max for g in model.groups)

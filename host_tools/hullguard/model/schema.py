@@ -112,6 +112,7 @@ class Fault:
     name: str
     signal: int
     type: str  # actuator | sensor
+    size_max: float | None = None  # signal units: the largest that isolation accounts for
 
 
 @dataclass(frozen=True)
@@ -508,8 +509,9 @@ def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
     kind = t.text("type", choices=["actuator", "sensor"])
     if kind == "actuator" and signals[places[0]].role != "input":
         raise t.error("type", f"'{signal}' is an output: an actuator fault needs an input")
+    size_max = t.number("size_max", 1e-12) if "size_max" in t else None
     t.close()
-    return Fault(name, places[0], kind)
+    return Fault(name, places[0], kind, size_max)
 
 
 def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...]) -> tuple[Observer, ...]:
