@@ -39,7 +39,7 @@ def _paths(steps: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def enclosure(interval: Interval, sample_time_s: float) -> tuple[Array, Array]:
-    """dA (n x n), dB (n x p): how far the discrete matrices of any plant of the interval can be from those of its middle, entry by entry."""
+    """Bounds dA (n x n), dB (n x p): how far the discrete matrices of any plant of the interval can be from those of its middle, entry by entry."""
     n, p = interval.B.shape
     D = _augmented(interval.A_pm, interval.B_pm)
     if not D.any():
