@@ -6,6 +6,8 @@
 #define STAMP_MASK 0x0FU
 #define STAMP_AHEAD_MAX 7U /* stamps beyond lie nearer in the past than in the future */
 #define VERDICT_LENGTH 8U
+#define VERDICT_LENGTH_WIDE 12U /* with room for candidates 31:16 */
+#define VERDICT_FAULTS 16U     /* candidates without that room */
 
 static void raise16(uint16_t *counter, uint16_t by)
 {
@@ -51,12 +53,27 @@ hg_status hg_sender_step(hg_sender *self, uint32_t k, const hg_real *value, hg_c
 
 /* ---- Detector node ---- */
 
+static bool wide(const hg_message *verdict)
+{
+    return verdict->length == VERDICT_LENGTH_WIDE;
+}
+
+/* Does the verdict frame have room for every fault that an alarm can name? */
+static bool verdict_holds(const hg_message *verdict, const hg_decision_config *decision)
+{
+    uint32_t faults = 0U;
+    for (uint8_t g = 0U; g < decision->generators; g++) {
+        faults |= decision->faults[g];
+    }
+    return wide(verdict) || ((faults >> VERDICT_FAULTS) == 0U);
+}
+
 static bool config_valid(const hg_node_config *config)
 {
     bool valid = (config->detector != NULL) && (config->message != NULL) && (config->verdict != NULL) && (config->status != NULL) &&
                  (config->heartbeat >= 1U);
     valid = valid && hg_frame_valid(config->verdict) && hg_frame_valid(config->status);
-    valid = valid && (config->verdict->length == VERDICT_LENGTH) && (config->status->length == VERDICT_LENGTH);
+    valid = valid && ((config->verdict->length == VERDICT_LENGTH) || wide(config->verdict)) && (config->status->length == VERDICT_LENGTH);
     valid = valid && (config->verdict->width == 0U) && (config->status->width == 0U) && (config->detector->hold != NULL);
     valid = valid && (config->closing < config->detector->groups) && (config->detector->groups <= HG_GROUPS_MAX);
     for (uint8_t i = 0U; valid && (i < config->detector->groups); i++) {
@@ -80,7 +97,8 @@ hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_no
         hg_e2e_receiver_start(&self->link[i].receiver);
         self->link[i].health = (hg_link_health){.good = 0U};
     }
-    return hg_detector_start(&self->detector, config->detector, &memory->detector, how);
+    const hg_status status = hg_detector_start(&self->detector, config->detector, &memory->detector, how);
+    return ((status == HG_OK) && (!verdict_holds(config->verdict, &config->detector->decision))) ? HG_E_CONFIG : status;
 }
 
 /* The group whose identifier this is, standard or extended alike; groups when there is none. */
@@ -317,6 +335,10 @@ static void put_verdict(hg_node *self, const hg_verdict *verdict, bool reply, hg
     frame->data[5] = (uint8_t)(verdict->bus & 0xFFU);
     frame->data[6] = (uint8_t)(verdict->bus >> 8U);
     frame->data[7] = (uint8_t)((verdict->k >> 4U) & 0xFFU);
+    if (wide(message)) {
+        frame->data[8] = (uint8_t)((verdict->candidates >> 16U) & 0xFFU);
+        frame->data[9] = (uint8_t)(verdict->candidates >> 24U);
+    }
     (void)hg_e2e_p22_protect(frame->data, frame->length, message->data_id, self->verdict_counter, (uint8_t)(verdict->k & STAMP_MASK));
     self->verdict_counter = (self->verdict_counter + 1U) & COUNTER_MASK;
 }
@@ -375,7 +397,7 @@ hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, 
 {
     hg_e2e_receiver fresh;
     hg_e2e_header header;
-    if ((!hg_frame_matches(message, frame)) || (frame->length != VERDICT_LENGTH)) {
+    if ((!hg_frame_matches(message, frame)) || ((frame->length != VERDICT_LENGTH) && (!wide(message)))) {
         return HG_E_FORMAT;
     }
     hg_e2e_receiver_start(&fresh);
@@ -383,9 +405,10 @@ hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, 
     if (status == HG_OK) {
         const uint8_t plant = frame->data[2] & 0x3U;
         const uint8_t basis = (frame->data[2] >> 2U) & 0x3U;
+        const uint32_t high = wide(message) ? ((uint32_t)frame->data[8] | ((uint32_t)frame->data[9] << 8U)) : 0U;
         *verdict = (hg_verdict){.k = ((uint32_t)frame->data[7] << 4U) | header.stamp,
                                 .model_hash = 0U,
-                                .candidates = (uint32_t)frame->data[3] | ((uint32_t)frame->data[4] << 8U),
+                                .candidates = (uint32_t)frame->data[3] | ((uint32_t)frame->data[4] << 8U) | (high << VERDICT_FAULTS),
                                 .plant = (hg_plant)plant,
                                 .basis = (hg_basis)basis,
                                 .bus = (uint16_t)(frame->data[5] | ((uint16_t)frame->data[6] << 8U)),

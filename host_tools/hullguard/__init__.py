@@ -1,3 +1,8 @@
 """Event-triggered, set-based fault detection on ECUs over CAN: the host side."""
 
+import os
+
+# Matrices are small here: a second thread of the linear algebra only waits for the first, several times as long as the work takes.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 __version__ = "0.1.0"

@@ -288,7 +288,7 @@ def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[s
         return
     if options.get("interface") == "virtual":
         raise BusError("a virtual bus lives inside one process and has no second end; use --bus inprocess")
-    if any(m.flags & candump.FD for m in [g.message for g in native.tables.groups]):
+    if any(m.flags & candump.FD for m in [*(g.message for g in native.tables.groups), native.tables.verdict, native.tables.status]):
         options.setdefault("fd", True)
     with opened(**options) as link, _node(args, made, options, pace.lockstep, start):
         name = choose.describe(str(options.get("channel"))) if options.get("interface") == "socketcan" else f"{options.get('interface')}:{options.get('channel')}"

@@ -17,6 +17,7 @@ from hullguard.core.native import REST, Frame, Node, Plant, Sender
 from hullguard.errors import InputError
 from hullguard.model import load_model, parse_fault, parse_override
 from hullguard.model.schema import SHIPPED, parse_model
+from hullguard.model.templates import expand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -38,7 +39,7 @@ def refused(result: Result, status: int, *words: str) -> str:
 
 @pytest.fixture
 def data() -> dict[str, Any]:
-    return tomllib.loads(PLATOON)
+    return expand(tomllib.loads(PLATOON), "platoon.toml")
 
 
 @pytest.fixture
@@ -317,6 +318,7 @@ def test_a_range_that_does_not_fit_its_frame_is_refused(own_model: Any, low_high
 
 def test_a_group_that_does_not_fit_its_frame_is_refused_with_the_way_out(given_model: Any, data: dict[str, Any]) -> None:
     data["signals"][0]["resolution"] = data["signals"][1]["resolution"] = data["signals"][2]["resolution"] = 1e-5
+    data["groups"][0]["frame"]["fd"] = False
     refused(given_model(data), BAD, "'measurement'", "fd = true")
     data["groups"][0]["frame"]["fd"] = True
     assert given_model(data).status == DONE
@@ -421,9 +423,9 @@ def test_a_wrong_fault_is_refused_with_what_would_do(cli: Cli, spec: str, word: 
 
 
 def test_more_faults_than_the_emulator_holds_are_refused(cli: Cli) -> None:
-    many = [x for i in range(17) for x in ("--fault", f"gap12_m:bias:0.1@{i}")]
-    refused(cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", *many), BAD, "16")
-    refused(cli("campaign", "platoon", "--runs", 1, "--samples", 30, "-q", *many), BAD, "16")
+    many = [x for i in range(33) for x in ("--fault", f"gap12_m:bias:0.1@{i}")]
+    refused(cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", *many), BAD, "32")
+    refused(cli("campaign", "platoon", "--runs", 1, "--samples", 30, "-q", *many), BAD, "32")
 
 
 def test_a_fault_far_ahead_ends_where_it_says(cli: Cli) -> None:

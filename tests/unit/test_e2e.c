@@ -59,7 +59,7 @@ static void the_checksum_agrees_with_bitwise_division(void **state)
         uint8_t data[HG_E2E_P22_LENGTH];
         uint8_t line[HG_E2E_P22_LENGTH];
         uint8_t ids[HG_E2E_IDS];
-        const uint8_t length = (uint8_t)draw_between(&random, 2, 32);
+        const uint8_t length = (uint8_t)draw_between(&random, 2, 64);
         for (size_t j = 0U; j < sizeof(data); j++) {
             data[j] = (uint8_t)draw(&random);
         }
@@ -75,8 +75,8 @@ static void the_checksum_agrees_with_bitwise_division(void **state)
 static void protect_writes_two_bytes_and_no_more(void **state)
 {
     (void)state;
-    for (uint8_t length = 2U; length <= 32U; length++) {
-        uint8_t data[34];
+    for (uint8_t length = 2U; length <= 64U; length++) {
+        uint8_t data[66];
         (void)memset(data, 0x5A, sizeof(data));
         assert_status(HG_OK, hg_e2e_p22_protect(data, length, counting, 0x1DU, 0x2BU));
         assert_int_equal(0xBD, data[1]); /* both modulo 16 */
@@ -89,7 +89,7 @@ static void protect_writes_two_bytes_and_no_more(void **state)
 static void a_length_out_of_range_is_refused_and_nothing_written(void **state)
 {
     (void)state;
-    const uint8_t lengths[] = {0U, 1U, 33U, 64U, 255U};
+    const uint8_t lengths[] = {0U, 1U, 65U, 128U, 255U};
     for (size_t i = 0U; i < COUNT(lengths); i++) {
         uint8_t data[256];
         uint8_t before[256];

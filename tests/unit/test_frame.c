@@ -282,7 +282,7 @@ static void messages_that_no_frame_can_carry_are_invalid(void **state)
         assert_int_equal((length >= 2U) && (length <= 8U), hg_frame_valid(&m));
         m.flags = HG_CAN_FD;
         const bool fd = ((length >= 2U) && (length <= 8U)) || (length == 12U) || (length == 16U) || (length == 20U) ||
-            (length == 24U) || (length == 32U);
+            (length == 24U) || (length == 32U) || (length == 48U) || (length == 64U);
         assert_int_equal(fd, hg_frame_valid(&m));
     }
 }
@@ -355,6 +355,35 @@ static void many_signals_share_a_long_frame(void **state)
     }
 }
 
+static void a_frame_of_64_bytes_carries_signals_to_its_end(void **state)
+{
+    (void)state;
+    uint32_t random = seed_of_run(36U);
+    hg_field fields[31];
+    hg_code_scale scales[31];
+    for (size_t j = 0U; j < COUNT(fields); j++) {
+        fields[j] = (hg_field){.start = (uint16_t)(16U + (16U * j)), .length = 16U, .flags = HG_FIELD_SIGNED};
+        scales[j] = scale_of(1.0, -32767, 32767);
+    }
+    hg_message message = {.id = 0x123U, .flags = HG_CAN_FD | HG_CAN_BRS, .length = 64U, .width = 31U, .field = fields, .scale = scales,
+        .data_id = ids};
+    assert_true(hg_frame_valid(&message));
+    for (int i = 0; i < 200; i++) {
+        int32_t code[31];
+        int32_t again[31];
+        hg_can_frame frame;
+        for (size_t j = 0U; j < COUNT(code); j++) {
+            code[j] = draw_between(&random, -32767, 32767);
+        }
+        hg_frame_pack(&message, code, &frame);
+        assert_int_equal((uint32_t)code[30] & 0xFFU, frame.data[62]);
+        assert_status(HG_OK, hg_frame_unpack(&message, &frame, again));
+        assert_memory_equal(code, again, sizeof(code));
+    }
+    message.length = 48U;
+    assert_false(hg_frame_valid(&message));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -368,6 +397,7 @@ int main(void)
         cmocka_unit_test(fields_outside_the_frame_or_of_no_type_are_invalid),
         cmocka_unit_test(a_scale_wider_than_its_field_is_invalid),
         cmocka_unit_test(many_signals_share_a_long_frame),
+        cmocka_unit_test(a_frame_of_64_bytes_carries_signals_to_its_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,6 +19,7 @@ static const hg_message messages[SM_GROUPS] = {
     {.id = 0x101U, .length = 6U, .width = 2U, .field = fields, .scale = sm_scale, .data_id = ids[0]},
     {.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .data_id = ids[1]}};
 static const hg_message verdict_message = {.id = 0x200U, .length = 8U, .data_id = ids[2]};
+static const hg_message wide_message = {.id = 0x200U, .flags = HG_CAN_FD | HG_CAN_BRS, .length = 12U, .data_id = ids[2]};
 static const hg_message status_message = {.id = 0x201U, .length = 8U, .data_id = ids[3]};
 static const hg_node_config usual = {.detector = &sm_detector, .message = messages, .closing = 1U, .verdict = &verdict_message,
                                      .status = &status_message, .heartbeat = HEARTBEAT, .model_hash = HASH};
@@ -1057,6 +1058,56 @@ static void the_first_verdict_is_told_with_the_status(void **state)
     assert_int_equal(0, frame[0].data[2] & 0x10); /* it would have been sent without being asked */
 }
 
+static void more_than_16_faults_need_the_longer_verdict_frame(void **state)
+{
+    (void)state;
+    static rig r;
+    static const uint32_t many[SM_GENERATORS] = {0x1U, 0x10000U};
+    begin(&r, HG_START_REST);
+    hg_detector_config detector = sm_detector;
+    detector.decision.faults = many;
+    hg_node_config c = usual;
+    c.detector = &detector;
+    assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+    c.verdict = &wide_message;
+    assert_status(HG_OK, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+    c.detector = &sm_detector; /* few faults may have it too */
+    assert_status(HG_OK, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+}
+
+static void the_longer_verdict_frame_has_the_documented_bytes_and_reads_back(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_can_frame frame[3];
+    hg_node_config c = usual;
+    hg_verdict back;
+    bool reply = false;
+    uint32_t random = seed_of_run(62U);
+    c.verdict = &wide_message;
+    begin_with(&r, &c, HG_START_REST);
+    const hg_verdict v = {.k = 0xFFFF5ABCUL, .model_hash = HASH, .candidates = 0x84216375UL, .plant = HG_PLANT_CONFIRMED,
+        .basis = HG_BASIS_SET, .bus = 0x1234U, .refused = true};
+    (void)report(&r, &v, false, frame);
+    const uint8_t expected[11] = {0xC0U, 0x27U, 0x75U, 0x63U, 0x34U, 0x12U, 0xABU, 0x21U, 0x84U, 0U, 0U};
+    assert_memory_equal(expected, &frame[0].data[1], 11U);
+    assert_int_equal(hg_e2e_p22_crc(frame[0].data, 12U, ids[2]), frame[0].data[0]);
+    assert_int_equal(12, frame[0].length);
+    assert_int_equal(HG_CAN_FD | HG_CAN_BRS, frame[0].flags);
+    assert_status(HG_E_FORMAT, hg_verdict_read(&verdict_message, &frame[0], &back, &reply));
+    for (int i = 0; i < 500; i++) {
+        hg_verdict any = v;
+        any.candidates = draw(&random);
+        (void)report(&r, &any, true, frame);
+        assert_status(HG_OK, hg_verdict_read(&wide_message, &frame[0], &back, &reply));
+        assert_true(back.candidates == any.candidates);
+        assert_true(back.k == 0xABCU);
+        assert_int_equal(any.bus, back.bus);
+    }
+    frame[0].data[9] ^= 1U;
+    assert_status(HG_E_CRC, hg_verdict_read(&wide_message, &frame[0], &back, &reply));
+}
+
 static void the_verdict_frame_has_the_documented_bytes(void **state)
 {
     (void)state;
@@ -1321,6 +1372,8 @@ int main(void)
         cmocka_unit_test(an_outage_drops_the_steps_that_are_due),
         cmocka_unit_test(no_alarm_is_confirmed_without_a_fault_whatever_the_link_does),
         cmocka_unit_test(the_first_verdict_is_told_with_the_status),
+        cmocka_unit_test(more_than_16_faults_need_the_longer_verdict_frame),
+        cmocka_unit_test(the_longer_verdict_frame_has_the_documented_bytes_and_reads_back),
         cmocka_unit_test(the_verdict_frame_has_the_documented_bytes),
         cmocka_unit_test(a_heartbeat_comes_when_nothing_changes),
         cmocka_unit_test(every_change_is_told_at_once),

@@ -3,6 +3,8 @@
  *  over all other bytes and then the data identifier of the counter's value; sequence counter 0 .. 15 in the low nibble of byte 1. The high
  *  nibble of byte 1 is the profile's to give away; here it carries the sample the frame belongs to, modulo 16.
  *  It guards integrity, not authenticity: whoever knows the data identifiers can forge a frame.
+ *  The profile itself ends at 32 bytes; frames of up to 64 bytes are protected by the same arithmetic. In frames of up to 12 bytes no error of
+ *  up to three bits passes; from 16 bytes (127 bits) on two bits at that distance do. CAN FD's own checksum of 17 or 21 bits covers the wire.
  *  The receiver's state moves by reception only, never by cycle: a sender that has nothing to say is not a lost frame.
  *  Reentrant per instance, safe in interrupt context, no allocation. */
 #ifndef HULLGUARD_E2E_H
@@ -14,7 +16,7 @@
 #include <stdint.h>
 
 #define HG_E2E_P22_HEADER 2U   /* bytes before the signals */
-#define HG_E2E_P22_LENGTH 32U  /* longest protected frame, bytes */
+#define HG_E2E_P22_LENGTH 64U  /* longest protected frame, bytes */
 #define HG_E2E_LOST 15U        /* more frames lost than the counter tells */
 #define HG_E2E_IDS 16U         /* data identifiers, one a counter value */
 

@@ -8,13 +8,15 @@
  *      byte  0        1                        2 ..
  *            CRC      stamp(7:4) counter(3:0)  signal, low byte first
  *
- *  The verdict frame, 8 bytes:
+ *  The verdict frame, 8 bytes; 12 bytes of CAN FD for a model of more than 16 faults:
  *
  *      byte  0    1              2                                                     3, 4         5, 6               7
  *            CRC  stamp counter  plant(1:0) basis(3:2) reply(4) refused(5) 0(7:6)      candidates   bus, 2 bits/group  k(11:4)
+ *      byte  8, 9               10, 11
+ *            candidates(31:16)  0
  *
  *  plant: hg_plant; basis: hg_basis; reply: sent only because a tick is answered in lockstep; refused: a number was refused since the start;
- *  candidates: bit i is fault i of the model; bus: hg_bus_health of group i in bits 2i+1:2i. The status frame, with every heartbeat, 8 bytes:
+ *  candidates: bit i is fault i of the model, low byte first; bus: hg_bus_health of group i in bits 2i+1:2i. The status frame, with every heartbeat, 8 bytes:
  *
  *      byte  0    1              2 .. 5                       6                             7
  *            CRC  stamp counter  model hash, low byte first   frames lost (saturated)       frames refused (saturated) */

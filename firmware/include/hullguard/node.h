@@ -55,7 +55,7 @@ typedef struct {                       /* flash: one a model, generated */
     const hg_detector_config *detector;
     const hg_message         *message;    /* [groups] */
     uint8_t                   closing;    /* the group whose frame closes the sample */
-    const hg_message         *verdict;    /* 8 bytes, no fields: the map stands in frame.h */
+    const hg_message         *verdict;    /* 8 bytes, or 12 for more than 16 faults; no fields: the map stands in frame.h */
     const hg_message         *status;     /* 8 bytes, no fields */
     uint16_t                  heartbeat;  /* samples between heartbeats, >= 1 */
     uint32_t                  model_hash;

@@ -13,7 +13,7 @@ import numpy as np
 
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.design import Design
-from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GroupTable, MessageTable, SignalTable
+from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, NARROW_FAULTS, SIGNED, GroupTable, MessageTable, SignalTable
 from hullguard.errors import InputError
 
 NAME_MAX = 32  # characters of a symbol in a DBC
@@ -174,7 +174,8 @@ def _verdict(design: Design, names: Names, senders: tuple[str, ...]) -> Message:
     ]
     for i, fault in enumerate(design.model.faults):
         about = f"Can {fault.name} ({fault.type} of {design.model.signals[fault.signal].name}) explain the alarm?"
-        entries.append(Entry(_numbered("fault", names.faults[i], i), 24 + i, 1, high=1, values=FAULT, about=about))
+        place = 24 + i if i < NARROW_FAULTS else 64 + i - NARROW_FAULTS
+        entries.append(Entry(_numbered("fault", names.faults[i], i), place, 1, high=1, values=FAULT, about=about))
     for i, group in enumerate(names.groups):
         entries.append(Entry(_numbered("bus", group, i), 40 + 2 * i, 2, high=3, values=BUS, about=f"Health of the link from group {group}"))
     about = "Bits 11 .. 4 of the sample index; with the stamp, the index modulo 4096"

@@ -11,7 +11,7 @@
 #define HGH_STATES_MAX 64
 #define HGH_SIGNALS_MAX 96
 #define HGH_DISTURBANCES_MAX 192
-#define HGH_FAULTS_MAX 16
+#define HGH_FAULTS_MAX 32
 
 typedef struct {
     uint64_t state;
@@ -101,7 +101,8 @@ void hgh_plant_move(hgh_plant *self);
 typedef struct {
     const hg_node_config   *node;
     const hg_sender_config *sender;       /* [groups] */
-    const hgh_plant_config *plant;        /* null for a replay */
+    const hgh_plant_config *plant;        /* [plants] run i emulates plant i modulo plants, all of one shape; null for a replay */
+    int32_t                 plants;       /* >= 1 with a plant */
     const double           *series;       /* [samples][signals] a replay's readings, or null */
     const double           *noise;        /* [signals] uniform noise added to them, or null */
     const double           *disturbance;  /* [samples][nd] instead of random ones, or null */

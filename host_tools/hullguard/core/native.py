@@ -16,6 +16,7 @@ from hullguard.design.design import Design
 from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, Tables
 from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
+from hullguard.model.plant import Plant as PlantModel
 from hullguard.model.schema import Model, Reference
 from hullguard.model.table import Array
 
@@ -338,11 +339,11 @@ def reference_of(library: Library, reference: Reference) -> Any:
 
 
 class PlantConfig:
-    """hgh_plant_config of a design."""
+    """hgh_plant_config of a design's plant, or of another one of its intervals."""
 
-    def __init__(self, native: Native, design: Design) -> None:
+    def __init__(self, native: Native, design: Design, other: PlantModel | None = None) -> None:
         ffi, model = native.library.ffi, design.model
-        plant = model.plant
+        plant = other or model.plant
         if plant.n > 64 or plant.p > 64 or len(model.signals) > 96 or plant.Ed.shape[1] > 192:
             raise InputError(f"model {model.name}: the emulator has room for 64 states, 96 signals and 192 disturbances")
         self._keep: list[Any] = []
@@ -382,8 +383,8 @@ class PlantConfig:
 class Plant:
     """The emulated plant."""
 
-    def __init__(self, native: Native, design: Design, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int = 0) -> None:
-        self._native, self._config = native, PlantConfig(native, design)
+    def __init__(self, native: Native, design: Design, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int = 0, other: PlantModel | None = None) -> None:
+        self._native, self._config = native, PlantConfig(native, design, other)
         ffi = native.library.ffi
         self._plant, self._value = ffi.new("hgh_plant *"), ffi.new("double[]", len(design.model.signals))
         array = fault_array(native.library, design.model, faults)
@@ -446,10 +447,14 @@ class Batch:
         noise: bool = False,
         disturbance: Array | None = None,
         initial: Array | None = None,
+        plants: Sequence[PlantModel] = (),
     ) -> None:
+        """`plants`: what the runs emulate in turn, plants of the design's intervals; the design's own plant where there are none."""
         ffi, model = native.library.ffi, design.model
         self._native, self._model = native, model
-        self._keep: list[Any] = [PlantConfig(native, design), fault_array(native.library, model, faults)]
+        emulated = [PlantConfig(native, design, p) for p in plants] or [PlantConfig(native, design)]
+        configs = ffi.new("hgh_plant_config[]", [p.config[0] for p in emulated])
+        self._keep: list[Any] = [configs, fault_array(native.library, model, faults), emulated]
 
         def doubles(a: Array) -> Any:
             flat = np.ascontiguousarray(a, dtype=np.float64)
@@ -459,7 +464,7 @@ class Batch:
         c = ffi.new("hgh_run_config *")
         c.node, c.sender = native.node, native.senders
         if series is None:
-            c.plant = self._keep[0].config
+            c.plant, c.plants = configs, len(emulated)
         else:
             if samples > len(series):
                 raise InputError(f"{samples} samples asked for, the recording has {len(series)}")

@@ -77,7 +77,7 @@ hgh_run *hgh_run_new(const hgh_run_config *config, uint64_t run)
     const hg_detector_config *d = config->node->detector;
     if ((config->signals > HGH_SIGNALS_MAX) || (config->signals != d->signals) || (config->faults > HGH_FAULTS_MAX) ||
         ((config->plant == NULL) == (config->series == NULL)) ||
-        ((config->plant != NULL) && ((config->plant->n > HGH_STATES_MAX) || (config->plant->p > HGH_STATES_MAX) || (config->plant->nd > HGH_DISTURBANCES_MAX)))) {
+        ((config->plant != NULL) && ((config->plants < 1) || (config->plant->n > HGH_STATES_MAX) || (config->plant->p > HGH_STATES_MAX) || (config->plant->nd > HGH_DISTURBANCES_MAX)))) {
         return NULL;
     }
     arena sizes = {NULL, sizeof(hgh_run)};
@@ -94,6 +94,9 @@ hgh_run *hgh_run_new(const hgh_run_config *config, uint64_t run)
     self->r = take(&a, 2U * (size_t)d->residuals, sizeof(double));
     self->J = self->r + d->residuals;
     self->config = *config;
+    if (config->plant != NULL) {
+        self->config.plant = &config->plant[run % (uint64_t)config->plants];
+    }
     self->size = sizes.used;
     bool good = hg_node_start(&self->node, config->node, &memory, (config->start == (int32_t)HG_START_REST) ? HG_START_REST : HG_START_MOVING) == HG_OK;
     for (uint8_t g = 0U; good && (g < d->groups); g++) {
@@ -106,7 +109,7 @@ hgh_run *hgh_run_new(const hgh_run_config *config, uint64_t run)
         return NULL;
     }
     if (config->plant != NULL) {
-        hgh_plant_start(&self->plant, config->plant, config->reference, config->fault, config->faults, config->seed, run);
+        hgh_plant_start(&self->plant, self->config.plant, config->reference, config->fault, config->faults, config->seed, run);
         if (config->initial != NULL) {
             memcpy(self->plant.x, config->initial, (size_t)config->plant->n * sizeof(double));
         }

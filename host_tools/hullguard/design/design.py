@@ -10,14 +10,15 @@ import numpy as np
 
 from hullguard.bus.bits import load_bound
 from hullguard.design import hull, store
-from hullguard.design.arith import digits
+from hullguard.design.arith import digits, mul
 from hullguard.design.checks import Check, generator_checks, refuse
+from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
 from hullguard.design.reach import reach
 from hullguard.design.search import FaultPath, between_events, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.predict import Bounds, predict_table, predicted_groups
-from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows
+from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
 from hullguard.errors import InputError
 from hullguard.model.plant import Feedback
 from hullguard.model.schema import Model, Observer
@@ -104,6 +105,16 @@ def fault_paths(model: Model, spec: Observer, faults: tuple[int, ...]) -> list[F
     return paths
 
 
+def observed(sub: SubPlant, paths: list[FaultPath]) -> tuple[SubPlant, list[FaultPath]]:
+    """The states that the outputs depend on, and what moves them: in a long platoon a search has to look at nothing else."""
+    seen = np.any(sub.C, axis=0)
+    for _ in range(sub.A.shape[0]):
+        seen = seen | np.any(sub.A[seen], axis=0)
+    felt = np.any(sub.Ed[seen], axis=0) | np.any(sub.Fd, axis=0)
+    part = replace(sub, A=sub.A[np.ix_(seen, seen)], B=sub.B[seen], C=sub.C[:, seen], Ed=sub.Ed[np.ix_(seen, felt)], Fd=sub.Fd[:, felt])
+    return part, [FaultPath(p.into_x[seen], p.into_value) for p in paths]
+
+
 def _spoken(model: Model, spec: Observer) -> tuple[Array, Array]:
     """Radius of each signal of a generator when it has just been sent, and the places of those that are sent together with a faulty one."""
     places = [model.outputs[k] for k in spec.outputs] + [model.inputs[k] for k in spec.inputs]
@@ -132,11 +143,12 @@ def find(model: Model, tick: Tick) -> Stored:
     """All that needs a search or a solver, rounded for the design file."""
     check_observable(model)
     horizon = max(g.trigger.interval_max + g.trigger.margin for g in model.groups)
-    plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B))
+    plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B), dA=digits(model.plant.dA), dB=digits(model.plant.dB))
     if plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(digits(plant.feedback.gain), plant.feedback.reference_bound))
     model = replace(model, plant=plant)
     reached = reach(model, horizon)
+    model = _disturbed(model, reached.state, reached.signal)
     radius = usual_radius(model)
     observers = []
     for i, spec in enumerate(model.observers):
@@ -148,11 +160,13 @@ def find(model: Model, tick: Tick) -> Stored:
         if not spec.filtered:
             best = between_events(sub, spec.order, paths, *_spoken(model, spec))
         else:
-            best = search(sub, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
+            seen, paths = observed(sub, paths)
+            best = search(seen, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
         o, f = best.observer, best.filter
         observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
+    spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
-    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), tuple(observers))
+    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), tuple(observers), *spread)
 
 
 def refilter(model: Model, old: Stored) -> Stored:
@@ -161,8 +175,9 @@ def refilter(model: Model, old: Stored) -> Stored:
     found = find(fresh, lambda *_: None)
     radius = usual_radius(model)
     observers = []
+    model = _disturbed(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), found.state_range, found.signal_reach)
     for spec, stored in zip(model.observers, old.observers, strict=True):
-        sub = sub_plant(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), spec, radius)
+        sub = sub_plant(model, spec, radius)
         G, H, L, T = structure(sub, stored.v, stored.gamma)
         f = no_filter(spec.order) if not spec.filtered else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
         observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
@@ -192,6 +207,8 @@ def stored_for(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
 def finish(model: Model, stored: Stored) -> Design:
     """Checks and tables from a model and its stored numbers: plain arithmetic."""
     plant = replace(model.plant, A=stored.A, B=stored.B)
+    if stored.dA is not None and stored.dB is not None:
+        plant = replace(plant, dA=stored.dA, dB=stored.dB)
     if stored.gain is not None and plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(stored.gain, plant.feedback.reference_bound))
     model = replace(model, plant=plant)
@@ -215,11 +232,16 @@ def _unique_ids(model: Model, tables: Tables) -> None:
                 raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{a.data_id[0]:02X}; give one another data_id")
 
 
-def _largest(model: Model, stored: Stored, place: int) -> float:
+def _disturbed(model: Model, state: Array, signal: Array) -> Model:
+    """The model with its intervals as a bounded disturbance. `state` (n) and `signal` (signals) are of its reach."""
+    return disturbed(model, state, np.array([_largest(model, signal, i) for i in range(len(model.signals))]))
+
+
+def _largest(model: Model, signal_reach: Array, place: int) -> float:
     """Largest magnitude of a healthy signal: what it can reach, or its declared range."""
     s = model.signals[place]
     declared = max(abs(s.low), abs(s.high))
-    reached = float(stored.signal_reach[place])
+    reached = float(signal_reach[place])
     if not np.isfinite(reached):
         return declared
     return min(declared, reached + abs(model.centre(place)) + s.resolution)
@@ -239,33 +261,39 @@ class Derived:
 
 
 def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> Derived:
-    usual = usual_radius(model)
-    width, place = len(model.signals), {}
-    inputs = np.array([_largest(model, stored, i) for i in model.inputs])
-    bounds = Bounds(stored.state_range, inputs, np.zeros(model.plant.n))
+    usual, place = usual_radius(model), {}
+    values = np.array([_largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
+    spread = constant_mismatch(model, stored.state_range, values)
+    bounds = Bounds(stored.state_range, values[model.inputs], spread)
     predictors = tuple(predict_table(model, i, groups, bounds) for i in predicted_groups(model)) if model.detector.prediction else ()
     for p in predictors:
         for n in range(len(p.output)):
-            place[p.first + n] = width + n
+            place[p.first + n] = len(usual) + n
         # Between events a signal is as old as half its longest interval, when nothing is known of its motion.
         middle = p.radius[(groups[p.group].interval_max - 1) // 2]
         usual = np.concatenate([usual, np.minimum(usual[p.first : p.first + len(p.output)], middle)])
-        width += len(p.output)
-    return Derived(predictors, place, None, (), (), usual, np.zeros(0))
+    if not uncertain(model):
+        return Derived(predictors, place, None, (), (), usual, np.zeros(0))
+    table, states = mismatch_table(model, stored.state_range)
+    scale = np.array([s.scale for s in model.signals]) / 2  # what a signal usually is, as for its trigger
+    own = np.array(table.constant) + mul(np.array(table.gain), (scale + usual_radius(model))[list(table.signal), None])[:, 0]
+    places = tuple(range(len(usual), len(usual) + len(states)))
+    return Derived(predictors, place, table, places, states, np.concatenate([usual, own]), spread[list(states)])
 
 
 def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Generator:
     spec, found = model.observers[i], stored.observers[i]
     outputs, inputs = [model.outputs[k] for k in spec.outputs], [model.inputs[k] for k in spec.inputs]
     radius = derived.usual[: len(model.signals)].copy()
+    bounded = sub_plant(_disturbed(model, stored.state_range, stored.signal_reach), spec, radius)
     sub = sub_plant(model, spec, radius)
     G, H, L, T = structure(sub, found.v, found.gamma)
     o = ObserverMatrices(found.v, found.gamma, G, H, L, T, found.W, found.V, found.V @ sub.D)
-    solved = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, spec.aware) if spec.filtered else no_filter(spec.order)
+    solved = post_filter(bounded, G, L, H, T, found.W, found.V, o.Qu, spec.aware) if spec.filtered else no_filter(spec.order)
     f = replace(solved, Lo=found.Lo, Mo=found.Mo)
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
-    values = np.array([_largest(model, stored, k) for k in outputs + inputs])
+    values = np.array([_largest(model, stored.signal_reach, k) for k in outputs + inputs])
     ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :], derived.largest)
     signal = tuple(derived.place.get(k, k) for k in outputs + inputs)
     own = derived.usual[list(signal + derived.uncertain)]
@@ -275,11 +303,11 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     blind = np.full(len(paths), np.inf)
     if paths and spec.filtered:
         try:
-            plain = post_filter(sub, G, L, H, T, found.W, found.V, o.Qu, False)
-            blind = smallest_faults(sub, o, plain, paths, radius[outputs + inputs])
+            plain = post_filter(bounded, G, L, H, T, found.W, found.V, o.Qu, False)
+            blind = smallest_faults(bounded, o, plain, paths, radius[outputs + inputs])
         except (np.linalg.LinAlgError, ValueError):
             pass  # without the event error the factorisation may not exist; then there is nothing to compare with
-    return Generator(spec, sub, o, f, linear, table, signal, own, found.smallest, blind)
+    return Generator(spec, bounded, o, f, linear, table, signal, own, found.smallest, blind)
 
 
 def _feeds(model: Model, used: set[int]) -> int:
@@ -321,7 +349,7 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
 
 def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...], derived: Derived) -> Tables:
     made = tuple(_generator_table(model, g, derived) for g in generators)
-    verdict, status = message_table("verdict", model.verdict, 8), message_table("status", model.status, 8)
+    verdict, status = verdict_table(model), message_table("status", model.status, 8)
     return Tables(
         model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch
     )

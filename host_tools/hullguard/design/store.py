@@ -43,6 +43,8 @@ class Stored:
     signal_reach: Array
     slew: Array
     observers: tuple[StoredObserver, ...]
+    dA: Array | None = None  # of an uncertain plant only
+    dB: Array | None = None
 
 
 def path_of(model_path: Path) -> Path:
@@ -73,6 +75,8 @@ def write(path: Path, name: str, stored: Stored) -> None:
     }
     if stored.gain is not None:
         data["plant"]["gain"] = stored.gain.tolist()
+    if stored.dA is not None and stored.dB is not None:
+        data["plant"] |= {"dA": stored.dA.tolist(), "dB": stored.dB.tolist()}
     path.write_text(HEADER.format(name=name) + tomli_w.dumps(data), encoding="utf-8")
 
 
@@ -121,6 +125,8 @@ def read(path: Path) -> Stored | None:
         signal_reach=np.where(reach < 0, np.nan, reach),
         slew=signals.matrix("slew", len(reach)),
         observers=tuple(observers),
+        dA=plant.matrix("dA", *A.shape) if "dA" in plant else None,
+        dB=(plant.matrix("dB", *B.shape) if B.size else B) if "dA" in plant else None,
     )
     for t in (plant, signals, top):
         t.close()

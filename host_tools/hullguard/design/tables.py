@@ -21,6 +21,9 @@ CODE_BITS_MAX = 24  # float32 holds every code of that many bits exactly
 EXTENDED, FD, BRS = 0x01, 0x04, 0x08
 MOTOROLA, SIGNED, FLOAT32 = 0x01, 0x02, 0x04
 HEADER_BITS = 16
+CLASSIC_MAX = 8
+FD_LENGTHS = (*range(CLASSIC_MAX + 1), 12, 16, 20, 24, 32, 48, 64)
+NARROW_FAULTS = 16  # candidates in a verdict frame of 8 bytes; one of 12 holds the rest
 
 
 @dataclass(frozen=True)
@@ -243,14 +246,24 @@ def signal_table(s: Signal, start: int, exact: bool) -> SignalTable:
 
 
 def message_table(name: str, frame: Frame, length: int) -> MessageTable:
-    """hg_message; the frame's length is rounded up to one that the format can carry."""
-    if frame.fd:
-        length = next((n for n in (8, 12, 16, 20, 24, 32) if n >= length), length)
-    if length > (32 if frame.fd else 8):
-        cure = "split the group" if frame.fd else "make the frame fd = true, or split the group"
-        raise InputError(f"group '{name}': its signals need {length} bytes with protection, more than {32 if frame.fd else 8}; {cure}")
-    flags = (EXTENDED if frame.extended else 0) | ((FD | BRS) if frame.fd else 0)
+    """hg_message; CAN FD where the model asks for it or says nothing and a classic frame is too short. A length that FD cannot carry is rounded up."""
+    fd = length > CLASSIC_MAX if frame.fd is None else frame.fd
+    most = FD_LENGTHS[-1] if fd else CLASSIC_MAX
+    if length > most:
+        cure = "split the group" if fd else "make the frame fd = true, or split the group"
+        raise InputError(f"group '{name}': its signals need {length} bytes with protection, more than {most}; {cure}")
+    if fd:
+        length = next(n for n in FD_LENGTHS if n >= max(length, CLASSIC_MAX))
+    flags = (EXTENDED if frame.extended else 0) | ((FD | BRS) if fd else 0)
     return MessageTable(name, frame.id, flags, length, data_ids(frame.data_id))
+
+
+def verdict_table(model: Model) -> MessageTable:
+    """hg_message of the verdict frame: 8 bytes, or 12 where there are more faults than those name."""
+    wide = len(model.faults) > NARROW_FAULTS
+    if wide and model.verdict.fd is False:
+        raise InputError(f"verdict frame: {len(model.faults)} faults need 12 bytes, 8 bytes of classic CAN name {NARROW_FAULTS}; leave fd out of its frame, or name fewer faults")
+    return message_table("verdict", model.verdict, 12 if wide else 8)
 
 
 def group_table(model: Model, group: Group, slew: Array) -> GroupTable:

@@ -1,17 +1,21 @@
 """Plants: matrices as given, or made by a builder, always discrete in the end.
 
 x(k+1) = A x + B u + Ed d      y(k) = C x + D u + Fd d      |d_j| <= 1
+
+An uncertain plant is any with |A* - A| <= dA and |B* - B| <= dB, entry by entry, one that varies with time among them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
 
 from hullguard.errors import InputError
+from hullguard.model.builders import BUILDERS, Interval
 from hullguard.model.table import Array, Table
+from hullguard.model.uncertain import drawn, enclosure, zero_order_hold
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class Plant:
     states: tuple[str, ...]
     A: Array  # n x n
     B: Array  # n x p
+    dA: Array  # n x n: the true A is this near, entry by entry; zeros for a certain plant
+    dB: Array  # n x p
     C: Array  # m x n
     D: Array  # m x p
     Ed: Array  # n x nd
@@ -38,6 +44,8 @@ class Plant:
     equilibrium_input: Array  # p: the input that holds it there
     state_range: Array  # n: |x| in operation as far as it is declared, infinite where it is not
     feedback: Feedback | None
+    interval: Interval | None  # what dA and dB were made from; None for a certain plant
+    hold_s: float | None  # sample time of the zero-order hold between the interval and A, B; None where the model gives discrete matrices
 
     @property
     def n(self) -> int:
@@ -55,76 +63,56 @@ class Plant:
         return int(self.B.shape[1])
 
 
-def zero_order_hold(A: Array, B: Array, sample_time_s: float) -> tuple[Array, Array]:
-    """Discrete A, B of a continuous plant whose input is held between samples."""
-    n, p = B.shape
-    M = scipy.linalg.expm(np.block([[A, B], [np.zeros((p, n + p))]]) * sample_time_s)
-    return M[:n, :n], M[:n, n:]
+def draw(plant: Plant, rng: np.random.Generator) -> Plant:
+    """A certain plant inside the intervals of an uncertain one, every entry drawn by itself, half of the plants at a corner; gain and equilibrium stay."""
+    if plant.interval is None:
+        return plant
+    A, B = drawn(plant.interval, rng)
+    if plant.hold_s is not None:
+        A, B = zero_order_hold(A, B, plant.hold_s)
+    return replace(plant, A=A, B=B, dA=np.zeros_like(A), dB=np.zeros_like(B), interval=None)
 
 
-def string_of_vehicles(table: Table) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    """A single-lane string (Levine and Athans 1966): speed deviations w_i and gap deviations g_(i,i+1); platoon, section 1.
-
-    dw_i/dt = -drag w_i + u_i      dg_(i,i+1)/dt = w_i - w_(i+1)
-    """
-    vehicles = table.whole("vehicles", 2, 20)
-    drag = table.number("drag_per_s", 0.0)
-    n = 2 * vehicles - 1
-    A, B = np.zeros((n, n)), np.zeros((n, vehicles))
-    states: list[str] = []
-    for i in range(vehicles):
-        A[2 * i, 2 * i], B[2 * i, i] = -drag, 1.0
-        states.append(f"speed{i + 1}_mps")
-        if i + 1 < vehicles:
-            A[2 * i + 1, 2 * i], A[2 * i + 1, 2 * i + 2] = 1.0, -1.0
-            states.append(f"gap{i + 1}{i + 2}_m")
-    return tuple(states), tuple(f"control{i + 1}_mps2" for i in range(vehicles)), A, B
-
-
-def car_following(table: Table) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    """Cars behind one another whose accelerations are measured: dv_i/dt = a_i, dg_i/dt = v_(i-1) - v_i; platoon, section 9."""
-    cars = table.whole("cars", 2, 20)
-    n = 2 * cars - 1
-    A, B = np.zeros((n, n)), np.zeros((n, cars))
-    states = ["speed1_mps"]
-    B[0, 0] = 1.0
-    for i in range(2, cars + 1):
-        speed, gap, ahead = 2 * i - 3, 2 * i - 2, max(2 * i - 5, 0)
-        states += [f"speed{i}_mps", f"gap{i}_m"]
-        B[speed, i - 1] = 1.0
-        A[gap, ahead], A[gap, speed] = 1.0, -1.0
-    return tuple(states), tuple(f"accel{i}_mps2" for i in range(1, cars + 1)), A, B
-
-
-BUILDERS = {"string_of_vehicles": string_of_vehicles, "car_following": car_following}
+def _read_matrices(table: Table, outputs: int, inputs: int) -> tuple[Interval, Array, Array]:
+    """A, B with their bounds, C and D as a user gives them."""
+    A = table.matrix("A")
+    n = A.shape[0]
+    if A.shape != (n, n):
+        raise table.error("A", f"expected a square matrix, found {A.shape[0]} x {A.shape[1]}")
+    B = table.matrix("B", n, inputs) if inputs else np.zeros((n, 0))
+    bounds = [table.matrix(key, *known.shape) if key in table else np.zeros_like(known) for key, known in (("A_pm", A), ("B_pm", B))]
+    for key, pm in zip(("A_pm", "B_pm"), bounds, strict=True):
+        if np.any(pm < 0.0):
+            raise table.error(key, "a bound is not negative")
+    C = table.matrix("C", outputs, n)
+    return Interval(A, B, *bounds), C, table.matrix("D", outputs, inputs) if "D" in table else np.zeros((outputs, inputs))
 
 
 def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[str, float], sample_time_s: float) -> Plant:
     """Read the [plant] table. `outputs` and `inputs` are signal names in the model's order; `noise` bounds sensor noise by signal."""
     if "builder" in table:
         name = table.text("builder", choices=sorted(BUILDERS))
-        states, names, A, B = BUILDERS[name](table)
+        builder = BUILDERS[name]
+        made = builder.make(table)
+        size = made.B.shape[1]
+        states, names = builder.states(size), builder.inputs(size)
         for signal in outputs:
             if signal not in states:
                 raise InputError(f"signal '{signal}': the builder {name} has no such state; it has {', '.join(states)}")
         if list(names) != inputs:
             raise InputError(f"inputs are {', '.join(inputs) or 'none'}: the builder {name} needs, in this order, {', '.join(names)}")
-        A, B = zero_order_hold(A, B, sample_time_s)
+        hold_s: float | None = sample_time_s
         C = np.eye(len(states))[[states.index(s) for s in outputs]]
         D = np.zeros((len(outputs), len(inputs)))
     else:
-        A = table.matrix("A")
-        n = A.shape[0]
-        if A.shape != (n, n):
-            raise table.error("A", f"expected a square matrix, found {A.shape[0]} x {A.shape[1]}")
-        B = table.matrix("B", n, len(inputs)) if inputs else np.zeros((n, 0))
-        C = table.matrix("C", len(outputs), n)
-        D = table.matrix("D", len(outputs), len(inputs)) if "D" in table else np.zeros((len(outputs), len(inputs)))
+        made, C, D = _read_matrices(table, len(outputs), len(inputs))
+        n = C.shape[1]
         states = tuple(table.names("states", [f"x{i + 1}" for i in range(n)]))
         if len(states) != n:
             raise table.error("states", f"expected {n} names, found {len(states)}")
-        if not table.flag("discrete", False):
-            A, B = zero_order_hold(A, B, sample_time_s)
+        hold_s = None if table.flag("discrete", False) else sample_time_s
+    A, B = (made.A, made.B) if hold_s is None else zero_order_hold(made.A, made.B, hold_s)
+    dA, dB = (made.A_pm, made.B_pm) if hold_s is None else enclosure(made, hold_s)
     n = A.shape[0]
     Ed, Fd = _disturbance(table, B, D, outputs, inputs, noise)
     equilibrium = table.vector("equilibrium", n) if "equilibrium" in table else np.zeros(n)
@@ -132,6 +120,8 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         states=states,
         A=A,
         B=B,
+        dA=dA,
+        dB=dB,
         C=C,
         D=D,
         Ed=Ed,
@@ -141,6 +131,8 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         equilibrium_input=_holding_input(table, A, B, equilibrium),
         state_range=table.vector("state_range", n, 0.0) if "state_range" in table else np.full(n, np.inf),
         feedback=_feedback(table, A, B) if "feedback" in table else None,
+        interval=made if made.A_pm.any() or made.B_pm.any() else None,
+        hold_s=hold_s,
     )
     table.close()
     return plant

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import itertools
 import json
@@ -19,13 +18,15 @@ from hullguard.model.detector import DetectorSpec, read_detector
 from hullguard.model.faults import FaultSpec, parse_fault
 from hullguard.model.plant import Plant, read_plant
 from hullguard.model.table import Array, Table
+from hullguard.model.templates import expand
 
 SCHEMA = 1
 NAME = re.compile(r"^[a-z][a-z0-9_]{0,30}$")
 SHIPPED = Path(__file__).resolve().parent.parent.parent / "models"
 GROUPS_MAX = 8
 GENERATORS_MAX = 32
-FAULTS_MAX = 16
+FAULTS_MAX = 32
+GROUP_SIGNALS_MAX = 32
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Frame:
 
     id: int
     extended: bool
-    fd: bool
+    fd: bool | None  # None: CAN FD where a classic frame is too short
     data_id: int
 
 
@@ -113,6 +114,7 @@ class Fault:
     name: str
     signal: int
     type: str  # actuator | sensor
+    size_max: float | None = None  # signal units: the largest that isolation accounts for
 
 
 @dataclass(frozen=True)
@@ -228,9 +230,17 @@ def load_model(name: str, overrides: dict[str, Any] | None = None, scenario: str
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     model = parse_model(data, path)
     changes = dict(model.scenario(scenario).set) | (overrides or {})
+    if not changes:
+        return model
+    # The plant's keys say what the templates stand for; all others name entries as they are after that.
     for key, value in changes.items():
-        _override(data, key, value)
-    return parse_model(data, path) if changes else model
+        if key.startswith("plant."):
+            _override(data, key, value)
+    data = expand(data, path.name)
+    for key, value in changes.items():
+        if not key.startswith("plant."):
+            _override(data, key, value)
+    return parse_model(data, path)
 
 
 def _override(data: dict[str, Any], key: str, value: Any) -> None:
@@ -266,7 +276,7 @@ def parse_override(text: str) -> tuple[str, Any]:
 
 def parse_model(source: dict[str, Any], path: Path) -> Model:
     """Check a model's data and make a Model of it."""
-    data = copy.deepcopy(source)
+    data = expand(source, path.name)
     top = Table(data, path.name)
     if top.whole("schema", 1, 10_000) != SCHEMA:
         raise top.error("schema", f"this version reads schema {SCHEMA}")
@@ -322,7 +332,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         latch=latch,
         faults=faults,
         scenarios=scenarios,
-        sha256=_fingerprint(source),
+        sha256=_fingerprint(data),
     )
 
 
@@ -396,6 +406,8 @@ def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[
         for member in members:
             if member not in names:
                 raise t.error("signals", f"'{member}' is not a declared signal")
+        if len(members) > GROUP_SIGNALS_MAX:
+            raise t.error("signals", f"{len(members)} signals, a frame has room for {GROUP_SIGNALS_MAX}; split the group")
         places = [names.index(m) for m in members]
         first = len(order)
         order += places
@@ -428,7 +440,7 @@ def read_frame(t: Table, data_id: int) -> Frame:
     """A message's place on the bus; the protection is profile 22."""
     extended = t.flag("extended", False)
     t.text("protection", "P22", ["P22"])
-    frame = Frame(t.whole("id", 0, 0x1FFFFFFF if extended else 0x7FF), extended, t.flag("fd", False), t.whole("data_id", 0, 0xFFFF, data_id))
+    frame = Frame(t.whole("id", 0, 0x1FFFFFFF if extended else 0x7FF), extended, t.flag("fd", False) if "fd" in t else None, t.whole("data_id", 0, 0xFFFF, data_id))
     t.close()
     return frame
 
@@ -503,8 +515,9 @@ def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
     kind = t.text("type", choices=["actuator", "sensor"])
     if kind == "actuator" and signals[places[0]].role != "input":
         raise t.error("type", f"'{signal}' is an output: an actuator fault needs an input")
+    size_max = t.number("size_max", 1e-12) if "size_max" in t else None
     t.close()
-    return Fault(name, places[0], kind)
+    return Fault(name, places[0], kind, size_max)
 
 
 def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...], needed: bool) -> tuple[Observer, ...]:

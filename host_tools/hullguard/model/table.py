@@ -76,6 +76,18 @@ class Table:
             return default
         return _number(self.raw(key), low, high, f"{self.where}.{key}")
 
+    def interval(self, key: str, low: float = -math.inf) -> tuple[float, float]:
+        """A number, or { value, pm }: an interval around it. All of it must be at least `low`. The number, and how far the true one may be from it."""
+        value = self.raw(key)
+        if not isinstance(value, dict):
+            return self.number(key, low), 0.0
+        inner = self.table(key)
+        middle, pm = inner.number("value", low), inner.number("pm", 0.0)
+        inner.close()
+        if middle - pm < low:
+            raise self.error(key, f"{middle:g} - {pm:g} is below {low:g}: make pm at most {middle - low:g}")
+        return middle, pm
+
     def vector(self, key: str, length: int | None = None, low: float = -math.inf) -> Array:
         """A list of finite numbers of this length; a single number fills a vector whose length is known."""
         value = self.raw(key)
