@@ -169,8 +169,8 @@ def _filter_of(G: Array, W: Array, Eb: Array, Fb: Array, X: Array, epsilon: floa
     values, vectors = np.linalg.eigh(S)
     if values[0] <= 0.0:
         raise np.linalg.LinAlgError("S is not positive definite")
-    Lo = np.linalg.solve(S, (G @ X @ W.T + Eb @ Fb.T).T).T
-    Mo: Array = vectors @ np.diag(values**-0.5) @ vectors.T
+    Lo = np.asarray(np.linalg.solve(S, (G @ X @ W.T + Eb @ Fb.T).T).T)
+    Mo = vectors @ np.diag(values**-0.5) @ vectors.T
     return PostFilter(Lo, Mo, X, S, Eb, Fb, epsilon)
 
 

@@ -141,6 +141,7 @@ class Scenario:
     reference: Reference
     faults: tuple[FaultSpec, ...]
     set: dict[str, Any] = field(default_factory=dict)
+    figures: str = ""  # "published": the report of a run begins with the publication's four figures
 
 
 @dataclass(frozen=True)
@@ -600,7 +601,8 @@ def _read_scenarios(top: Table, path: Path) -> tuple[Scenario, ...]:
         overrides = t.raw("set") if "set" in t else {}
         if not isinstance(overrides, dict):
             raise t.error("set", "expected a table of KEY = VALUE")
-        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides))
+        figures = t.text("figures", "", ["published"])
+        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides, figures))
         t.close()
     if not scenarios:
         scenarios.append(Scenario("default", 200, Reference("rest", 0.0, 1), ()))
