@@ -317,7 +317,7 @@ class _Trials:
                 if self.best is not None and not population:
                     points[0] = self.best  # a second helping goes on where the first one ended
                 start = points[int(np.argmin([self(x) for x in points]))]
-                step = 0.3 * float(np.linalg.norm(start)) / math.sqrt(problem.size)
+                step = 0.5 * float(np.linalg.norm(start)) / math.sqrt(problem.size)
                 options = {"randn": lambda *shape: rng.standard_normal(shape), "seed": math.nan, "verbose": -9, "tolfun": 1e-5, "tolx": 1e-5}
                 run = cma.CMAEvolutionStrategy(start, step, options | ({"popsize": population} if population else {}))
                 while not run.stop():
