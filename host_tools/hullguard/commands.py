@@ -113,6 +113,8 @@ def matrices(made: Design) -> list[dict[str, Any]]:
         row["outputs"] = [made.model.signals[made.model.outputs[i]].name for i in g.spec.outputs]
         row["inputs"] = [made.model.signals[made.model.inputs[i]].name for i in g.spec.inputs]
         row["smallest_fault"] = _by_fault(made, g.spec.faults, g.smallest)
+        row["smallest_fault_first_draw"] = _by_fault(made, g.spec.faults, g.first)
+        row["delay"] = {"size": g.spec.search.size, "samples": _by_fault(made, g.spec.faults, g.delay)}
         row["smallest_fault_without_trigger_aware_filter"] = _by_fault(made, g.spec.faults, g.blind)
         row["regularised"] = g.filter.regularised
         row["rounding"] = g.tables.rounding.tolist()
@@ -188,7 +190,7 @@ def run_run(args: argparse.Namespace) -> int:
     faults = the_faults(args, model, scenario.faults, samples)
     native = Native(library(args.real), made.tables)
     source = Plant(native, made, scenario.reference, faults, args.seed)
-    return _drive(args, made, native, source, samples, faults, scenario.name, REST)
+    return _drive(args, made, native, source, samples, faults, scenario.name, REST, {"figures": scenario.figures} if scenario.figures else {})
 
 
 def run_replay(args: argparse.Namespace) -> int:
@@ -202,8 +204,18 @@ def run_replay(args: argparse.Namespace) -> int:
     return _drive(args, made, native, source, samples, faults, Path(args.csv).name, MOVING)
 
 
-def _drive(args: argparse.Namespace, made: Design, native: Native, source: Source, samples: int, faults: list[FaultSpec], scenario: str, start: int) -> int:
-    """Find the bus, run, write what was asked for, judge."""
+def _drive(
+    args: argparse.Namespace,
+    made: Design,
+    native: Native,
+    source: Source,
+    samples: int,
+    faults: list[FaultSpec],
+    scenario: str,
+    start: int,
+    more: dict[str, Any] | None = None,
+) -> int:
+    """Find the bus, run, write what was asked for, judge. `more` goes into the result."""
     options = bus_options(args)
     if not options and args.bus == "auto" and choose.existing_vcan() is None and choose.launcher() is not None and INSIDE not in os.environ:
         return _drive_inside(args)
@@ -218,7 +230,7 @@ def _drive(args: argparse.Namespace, made: Design, native: Native, source: Sourc
         finally:
             if log is not None:
                 log.close()
-    facts = {"bus": name, "seed": args.seed, "scenario": scenario}
+    facts = {"bus": name, "seed": args.seed, "scenario": scenario} | (more or {})
     result = summary(made, native, trace, faults, facts)
     if out is not None:
         write_files(out, made, native, trace, faults, result)

@@ -14,13 +14,13 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools"))
 
-import pytest  # noqa: E402
-from hullguard.cli import main  # noqa: E402
-from hullguard.core.library import Library, library  # noqa: E402
-from hullguard.core.native import Batch, Frame, Native  # noqa: E402
-from hullguard.design.design import Design, design  # noqa: E402
-from hullguard.model import load_model, parse_fault  # noqa: E402
-from hullguard.model.schema import Reference  # noqa: E402
+import pytest
+from hullguard.cli import main
+from hullguard.core.library import Library, library
+from hullguard.core.native import Batch, Frame, Native
+from hullguard.design.design import Design, design
+from hullguard.model import load_model, parse_fault
+from hullguard.model.schema import Reference
 
 SEED = int(os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little"))
 REALS = ("f32", "f64")

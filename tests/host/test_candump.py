@@ -12,7 +12,17 @@ import pytest
 from host_support import SEED, classic_bits
 from hullguard.bus import candump
 from hullguard.bus.bits import worst_bits
-from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE, Entry, Writer, line, read
+from hullguard.bus.candump import (
+    BRS,
+    ERROR,
+    EXTENDED,
+    FD,
+    REMOTE,
+    Entry,
+    Writer,
+    line,
+    read,
+)
 from hullguard.bus.link import from_message, to_message
 from hullguard.core.library import library
 from hullguard.core.native import Frame, frame_bits

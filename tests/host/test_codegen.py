@@ -13,12 +13,20 @@ import cantools
 import numpy as np
 import pytest
 from cantools.database.can import Database, Message
-
 from hullguard.codegen import emit_c, emit_dbc, write_all
 from hullguard.codegen.c import detector_reals, fill, real
 from hullguard.codegen.dbc import short
 from hullguard.design.design import Design, design
-from hullguard.design.tables import EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GroupTable, MessageTable, SignalTable
+from hullguard.design.tables import (
+    EXTENDED,
+    FD,
+    FLOAT32,
+    MOTOROLA,
+    SIGNED,
+    GroupTable,
+    MessageTable,
+    SignalTable,
+)
 from hullguard.errors import InputError
 from hullguard.model.schema import load_model
 

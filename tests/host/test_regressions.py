@@ -9,9 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from hullguard.core.library import library
-from hullguard.core.native import MOVING, REST, Batch, Native, Node, Plant, Sender, Verdict
+from hullguard.core.native import (
+    MOVING,
+    REST,
+    Batch,
+    Native,
+    Node,
+    Plant,
+    Sender,
+    Verdict,
+)
 from hullguard.design.design import Design, design, find, finish
 from hullguard.errors import InputError
 from hullguard.model import load_model

@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
-
 from hullguard.design.design import Design, design
 from hullguard.errors import InputError
 from hullguard.model.schema import load_model
@@ -25,6 +23,7 @@ from hullguard.report.design_report import write_design_report
 from hullguard.report.live import LiveTable
 from hullguard.report.run_data import read_run
 from hullguard.report.run_report import headline, write_picture, write_run_report
+from rich.console import Console
 
 VOID = {"meta", "br", "hr", "img", "link", "input", "col"}
 

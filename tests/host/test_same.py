@@ -12,7 +12,16 @@ from host_support import REALS, SEED, SILENT_1, Cli, Models, Ready, build_librar
 from hullguard.campaign.campaign import Job, campaign
 from hullguard.codegen import emit_c
 from hullguard.core.library import Library
-from hullguard.core.native import PLANT_STATES, REST, Frame, Native, Node, Plant, Sender, bus_of
+from hullguard.core.native import (
+    PLANT_STATES,
+    REST,
+    Frame,
+    Native,
+    Node,
+    Plant,
+    Sender,
+    bus_of,
+)
 from hullguard.model import parse_fault
 from hullguard.plant.run import InProcess, Pace, Run, Trace
 

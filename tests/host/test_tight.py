@@ -10,9 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host_support import PERIODIC, REALS, SEED, SILENT_1, SILENT_2, Alarms, Models, Ready, alarms, build_library
+from host_support import (
+    PERIODIC,
+    REALS,
+    SEED,
+    SILENT_1,
+    SILENT_2,
+    Alarms,
+    Models,
+    Ready,
+    alarms,
+    build_library,
+)
 from hullguard.core.library import Library, library
-from hullguard.design import hull
 from scipy.optimize import linprog
 
 OUTPUTS, INPUTS = 3, 3

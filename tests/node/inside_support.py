@@ -15,7 +15,16 @@ from typing import Any
 
 from hullguard.bus.link import CanLink, opened
 from hullguard.core.library import library
-from hullguard.core.native import REST, Frame, Native, Node, Plant, Sender, Verdict, read_verdict
+from hullguard.core.native import (
+    REST,
+    Frame,
+    Native,
+    Node,
+    Plant,
+    Sender,
+    Verdict,
+    read_verdict,
+)
 from hullguard.design.design import Design, design
 from hullguard.model import load_model, parse_fault
 from node_support import NODE, SEED, environment

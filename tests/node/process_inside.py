@@ -15,7 +15,17 @@ import pytest
 from hullguard.bus.candump import BRS, EXTENDED, FD, REMOTE
 from hullguard.core.native import Frame
 from hullguard.errors import BusError
-from inside_support import Drive, collect, detect, exchange, health, link, node, ready, silent
+from inside_support import (
+    Drive,
+    collect,
+    detect,
+    exchange,
+    health,
+    link,
+    node,
+    ready,
+    silent,
+)
 from node_support import NODE, command, hullguard
 
 ALARMS = ("provisional", "confirmed")

@@ -17,7 +17,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, Batch, Native
 from hullguard.design.design import Design, design

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from hullguard.design.design import Design, design
 from hullguard.model import load_model
 

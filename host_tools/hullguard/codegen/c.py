@@ -12,9 +12,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hullguard.codegen.names import Names, names_of, unit_of
-from hullguard.design.design import Design
 from hullguard.design.bank_table import BankTable
-from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, PredictTable, SignalTable, Tables
+from hullguard.design.design import Design
+from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, SignalTable, Tables
 from hullguard.errors import InputError
 
 WIDTH = 140  # columns
@@ -140,8 +140,8 @@ def _limits(tables: Tables) -> list[str]:
 def _storage(tables: Tables) -> list[str]:
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
     codes, closing = max(2 * tables.signals, 1), max(len(tables.groups[tables.closing].signals), 1)
-    own = (("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), ("hg_hull", "hull", len(tables.generators)))
-    own += (("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums))
+    own = [("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), ("hg_hull", "hull", len(tables.generators))]
+    own += [("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums)]
     return [
         "/* Memory of one detector node. */",
         "typedef struct {",
@@ -362,8 +362,8 @@ def _predictors(tables: Tables, signals: Sequence[str]) -> list[str]:
         lines += [f"/* ---- Prediction of group {tables.groups[p.group].name} ---- */", ""]
         lines += table("uint8_t", f"{n}_input", f"{inputs}", [unsigned(p.input)], "places of the inputs: " + ", ".join(signals[g] for g in p.input))
         lines += table("hg_real", f"{n}_known", f"{inputs}", [reals(p.known)], "radius up to which an input is known, signal units")
-        parts = (("correct", width, "correction of the state from a frame's innovation"), ("state", order, "next state from state"), ("drive", inputs, "next state from inputs"))
-        parts += (("output", order, "values from state"), ("direct", inputs, "values from inputs"))
+        parts = [("correct", width, "correction of the state from a frame's innovation"), ("state", order, "next state from state"), ("drive", inputs, "next state from inputs")]
+        parts += [("output", order, "values from state"), ("direct", inputs, "values from inputs")]
         for part, cols, about in parts:
             matrix = getattr(p, part)
             lines += table("hg_real", f"{n}_{part}", f"{len(matrix)}][{cols}", [reals(r) for r in matrix], f"{about}, row-major")
@@ -458,10 +458,10 @@ def _generators(tables: Tables) -> list[str]:
 
 
 def _judged(tables: Tables) -> list[str]:
-    judged, count = [*tables.generators, *tables.banks], tables.judged
-    lines = table("uint8_t", "feeds", f"{count}", [[f"0x{g.feeds:02X}U" for g in judged]], "groups that feed a generator or a bank, bit i: group i")
+    count = tables.judged
+    lines = table("uint8_t", "feeds", f"{count}", [[f"0x{g.feeds:02X}U" for g in tables.judging]], "groups that feed a generator or a bank, bit i: group i")
     about = "faults that can explain an alarm of a generator or a bank, bit i: fault i"
-    return lines + table("uint32_t", "moved_by", f"{count}", [[f"0x{g.faults:X}UL" for g in judged]], about)
+    return lines + table("uint32_t", "moved_by", f"{count}", [[f"0x{g.faults:X}UL" for g in tables.judging]], about)
 
 
 def _node(design: Design) -> list[str]:

@@ -117,9 +117,8 @@ class Native:
         self._derived(d)
         self._banks(d)
         d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = t.judged, t.up, t.down, t.latch
-        judged = [*t.generators, *t.banks]
-        d.decision.feeds = self._ints("uint8_t", [g.feeds for g in judged])
-        d.decision.faults = self._ints("uint32_t", [g.faults for g in judged])
+        d.decision.feeds = self._ints("uint8_t", [g.feeds for g in t.judging])
+        d.decision.faults = self._ints("uint32_t", [g.faults for g in t.judging])
         d.history, d.window, d.residuals, d.codes = t.history, t.window, t.residuals, 2 * t.signals
         d.reals, d.sums = self.library.lib.hg_detector_reals(d), self.library.lib.hg_detector_sums(d)
         return d

@@ -46,13 +46,16 @@ def riccati(o: ObserverMatrices, f: PostFilter) -> tuple[float, float, float]:
 
 
 def all_pass(o: ObserverMatrices, f: PostFilter) -> float:
-    """Largest distance from 1 of the singular values of R G_rd on the unit circle."""
+    """Largest distance from 1 of the singular values of R G_rd on the unit circle.
+
+    R (Fb + W (zI - G)^-1 Eb) = Mo (Fb + W (zI - G + Lo W)^-1 (Eb - Lo Fb)): one inverse instead of a product of two, of which that of G can be
+    so large that rounding alone would show.
+    """
     eye, worst = np.eye(o.G.shape[0]), 0.0
     for w in np.linspace(0.0, np.pi, FREQUENCIES):
         z = np.exp(1j * w)
-        from_d = f.Fb + o.W @ np.linalg.solve(z * eye - o.G, f.Eb)
-        R = f.Mo - f.Mo @ o.W @ np.linalg.solve(z * eye - o.G + f.Lo @ o.W, f.Lo)
-        worst = max(worst, float(np.abs(np.linalg.svd(R @ from_d, compute_uv=False) - 1.0).max()))
+        from_d = f.Mo @ (f.Fb + o.W @ np.linalg.solve(z * eye - o.G + f.Lo @ o.W, f.Eb - f.Lo @ f.Fb))
+        worst = max(worst, float(np.abs(np.linalg.svd(from_d, compute_uv=False) - 1.0).max()))
     return worst
 
 

@@ -14,10 +14,10 @@ from hullguard.design.arith import digits, mul
 from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
-from hullguard.design.reach import reach
-from hullguard.design.search import FaultPath, between_events, search, smallest_faults
-from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.predict import Bounds, predict_table, predicted_groups
+from hullguard.design.reach import reach
+from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
+from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
 from hullguard.errors import InputError
 from hullguard.model.plant import Feedback
@@ -41,7 +41,9 @@ class Generator:
     signal: tuple[int, ...]  # places of its signals
     radius: Array  # usual radii of its signals, then of the uncertain states
     smallest: Array  # faults of the spec
-    blind: Array  # the same with a post-filter that does not know of the trigger
+    first: Array  # the same of the first point that the search drew, NaN where there was none
+    delay: Array  # samples until a fault of the search's size leaves the steady threshold
+    blind: Array  # smallest with a post-filter that does not know of the trigger
 
 
 @dataclass(frozen=True)
@@ -150,23 +152,25 @@ def find(model: Model, tick: Tick) -> Stored:
     reached = reach(model, horizon)
     model = _disturbed(model, reached.state, reached.signal)
     radius = usual_radius(model)
-    observers = []
-    for i, spec in enumerate(model.observers):
-        sub = sub_plant(model, spec, radius)
-        where = f"{model.path.name}: detector.observers[{i}]"
-        basis = check_parity(sub, spec.order, where)
-        paths = fault_paths(model, spec, spec.faults)
-        own = np.concatenate([sub.Sy, sub.Su])
-        if not spec.filtered:
-            best = between_events(sub, spec.order, paths, *_spoken(model, spec))
-        else:
-            seen, paths = observed(sub, paths)
-            best = search(seen, basis, spec.order, spec.residuals, paths, own, spec.aware, spec.search, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
-        o, f = best.observer, best.filter
-        observers.append(StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6)))
+    observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
     spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
-    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), tuple(observers), *spread)
+    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), observers, *spread)
+
+
+def _found(model: Model, i: int, radius: Array, tick: Tick) -> StoredObserver:
+    """One generator of a model, searched for as far as the model does not choose it."""
+    spec = model.observers[i]
+    sub, where = sub_plant(model, spec, radius), f"{model.path.name}: detector.observers[{i}]"
+    check_parity(sub, spec.order_max, where)
+    paths = fault_paths(model, spec, spec.faults)
+    if spec.filtered:
+        seen, paths = observed(sub, paths)
+        best = search(seen, spec, paths, np.concatenate([sub.Sy, sub.Su]), where, partial(tick, f"generator {i + 1} of {len(model.observers)}"))
+    else:
+        best = between_events(sub, spec.order, paths, *_spoken(model, spec))
+    o, f = best.observer, best.filter
+    return StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6), digits(best.first, 6))
 
 
 def refilter(model: Model, old: Stored) -> Stored:
@@ -174,23 +178,40 @@ def refilter(model: Model, old: Stored) -> Stored:
     fresh = replace(model, observers=())
     found = find(fresh, lambda *_: None)
     radius = usual_radius(model)
+    same = _disturbed(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), found.state_range, found.signal_reach)
     observers = []
-    model = _disturbed(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), found.state_range, found.signal_reach)
-    for spec, stored in zip(model.observers, old.observers, strict=True):
-        sub = sub_plant(model, spec, radius)
+    for i, (spec, stored) in enumerate(zip(model.observers, old.observers, strict=True)):
+        if spec.chosen:
+            observers.append(_found(same, i, radius, lambda *_: None))
+            continue
+        sub = sub_plant(same, spec, radius)
         G, H, L, T = structure(sub, stored.v, stored.gamma)
-        f = no_filter(spec.order) if not spec.filtered else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
-        observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
+        if not spec.filtered:
+            observers.append(stored)
+            continue
+        Qu = stored.V @ sub.D
+        f = post_filter(sub, G, L, H, T, stored.W, stored.V, Qu, spec.aware)
+        o = ObserverMatrices(stored.v, stored.gamma, G, H, L, T, stored.W, stored.V, Qu)
+        paths = fault_paths(model, spec, spec.faults)
+        smallest = smallest_faults(sub, o, f, paths, np.concatenate([sub.Sy, sub.Su]))
+        # What the search first drew for other bounds says nothing about these.
+        none = np.full(len(paths), np.nan)
+        observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised, smallest=digits(smallest, 6), first=none))
     return replace(found, observers=tuple(observers))
 
 
 def _fits(model: Model, old: Stored) -> bool:
     """Whether the stored parity vectors can serve this model: same plant, same shapes."""
     same_plant = old.A.shape == model.plant.A.shape and np.allclose(old.A, model.plant.A, 0, 1e-12) and np.allclose(old.B, model.plant.B, 0, 1e-12)
-    shapes = len(old.observers) == len(model.observers) and all(
-        o.v.shape == (s.order + 1, len(s.outputs)) and o.W.shape[0] <= s.residuals for o, s in zip(old.observers, model.observers, strict=False)
-    )
-    return bool(same_plant and shapes)
+    return bool(same_plant and len(old.observers) == len(model.observers) and all(map(_serves, old.observers, model.observers)))
+
+
+def _serves(o: StoredObserver, spec: Observer) -> bool:
+    """Whether a stored generator has the shapes of a specification, or is not needed. Half a choice is no reason to keep the other half."""
+    if spec.chosen:
+        return True
+    fits = spec.order <= o.v.shape[0] - 1 <= spec.order_max and o.v.shape[1] == len(spec.outputs) and o.W.shape[0] <= spec.residuals
+    return fits and spec.parity is None and spec.poles is None
 
 
 def stored_for(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
@@ -211,7 +232,8 @@ def finish(model: Model, stored: Stored) -> Design:
         plant = replace(plant, dA=stored.dA, dB=stored.dB)
     if stored.gain is not None and plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(stored.gain, plant.feedback.reference_bound))
-    model = replace(model, plant=plant)
+    specs = tuple(replace(s, order=len(o.gamma), order_max=len(o.gamma)) for s, o in zip(model.observers, stored.observers, strict=True))
+    model = replace(model, plant=plant, observers=specs)
     groups = tuple(group_table(model, g, stored.slew) for g in model.groups)
     derived = _derived(model, stored, groups)
     generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers)))
@@ -307,7 +329,8 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
             blind = smallest_faults(bounded, o, plain, paths, radius[outputs + inputs])
         except (np.linalg.LinAlgError, ValueError):
             pass  # without the event error the factorisation may not exist; then there is nothing to compare with
-    return Generator(spec, bounded, o, f, linear, table, signal, own, found.smallest, blind)
+    delay = fault_delays(bounded, o, f, paths, radius[outputs + inputs], spec.search.size) if spec.filtered else np.full(len(paths), np.nan)
+    return Generator(spec, bounded, o, f, linear, table, signal, own, found.smallest, found.first, delay, blind)
 
 
 def _feeds(model: Model, used: set[int]) -> int:

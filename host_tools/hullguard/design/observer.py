@@ -12,6 +12,9 @@ from hullguard.errors import InputError
 from hullguard.model.table import Array
 
 RANK_TOLERANCE = 1e-10  # of |T|_F, absolute: a default tolerance loses W in one design of eleven
+POLISH_STEPS = 3  # of Newton's method behind scipy's solution
+NEWTON_STEPS = 60  # from Lo = 0
+DOUBLINGS = 40
 
 
 @dataclass(frozen=True)
@@ -125,12 +128,23 @@ def normal_rank(G: Array, W: Array, Eb: Array, Fb: Array) -> int:
     return int(np.linalg.matrix_rank(M))
 
 
-def post_filter(plant: SubPlant, G: Array, L: Array, H: Array, T: Array, W: Array, V: Array, Qu: Array, aware: bool) -> PostFilter:
-    """Co-inner-outer factorisation; with `aware` the event error is one more disturbance."""
+def _disturbed(plant: SubPlant, L: Array, H: Array, T: Array, V: Array, Qu: Array, aware: bool) -> tuple[Array, Array]:
+    """Eb and Fb: how disturbances, and event errors where `aware`, reach z and r0."""
     Eb, Fb = T @ plant.Ed - L @ plant.Fd, V @ plant.Fd
     if aware:
         Eb = np.hstack([Eb, -L * plant.Sy, -H * plant.Su])
         Fb = np.hstack([Fb, V * plant.Sy, -Qu * plant.Su])
+    return Eb, Fb
+
+
+def disturbance_rank(plant: SubPlant, G: Array, H: Array, L: Array, T: Array, W: Array, V: Array, aware: bool) -> int:
+    """Rows of r0 that disturbances can move independently: a post-filter for more does not exist."""
+    return normal_rank(G, W, *_disturbed(plant, L, H, T, V, V @ plant.D, aware))
+
+
+def post_filter(plant: SubPlant, G: Array, L: Array, H: Array, T: Array, W: Array, V: Array, Qu: Array, aware: bool, quick: bool = False) -> PostFilter:
+    """Co-inner-outer factorisation; with `aware` the event error is one more disturbance. `quick`: good enough to compare candidates."""
+    Eb, Fb = _disturbed(plant, L, H, T, V, Qu, aware)
     rows = W.shape[0]
     epsilon = 0.0
     if normal_rank(G, W, Eb, Fb) < rows:
@@ -138,15 +152,70 @@ def post_filter(plant: SubPlant, G: Array, L: Array, H: Array, T: Array, W: Arra
         epsilon = 1e-6 * max(float(np.linalg.norm(Fb)), float(np.linalg.norm(Eb)), 1e-12)
         Eb = np.hstack([Eb, np.zeros((Eb.shape[0], rows))])
         Fb = np.hstack([Fb, epsilon * np.eye(rows)])
-    X = scipy.linalg.solve_discrete_are(G.T, W.T, Eb @ Eb.T, Fb @ Fb.T, s=Eb @ Fb.T)
+    if quick:
+        return _filter_of(G, W, Eb, Fb, _riccati(G, W, Eb, Fb), epsilon)
+    return polished(G, W, Eb, Fb, epsilon)
+
+
+def _riccati(G: Array, W: Array, Eb: Array, Fb: Array) -> Array:
+    """The stabilising solution X of the Riccati equation, as scipy has it."""
+    return np.asarray(scipy.linalg.solve_discrete_are(G.T, W.T, Eb @ Eb.T, Fb @ Fb.T, s=Eb @ Fb.T))
+
+
+def _filter_of(G: Array, W: Array, Eb: Array, Fb: Array, X: Array, epsilon: float) -> PostFilter:
+    """Lo, Mo and S of a solution X."""
     S = W @ X @ W.T + Fb @ Fb.T
     S = (S + S.T) / 2
     values, vectors = np.linalg.eigh(S)
     if values[0] <= 0.0:
         raise np.linalg.LinAlgError("S is not positive definite")
-    Lo = np.linalg.solve(S, (G @ X @ W.T + Eb @ Fb.T).T).T
+    Lo = np.asarray(np.linalg.solve(S, (G @ X @ W.T + Eb @ Fb.T).T).T)
     Mo = vectors @ np.diag(values**-0.5) @ vectors.T
     return PostFilter(Lo, Mo, X, S, Eb, Fb, epsilon)
+
+
+def polished(G: Array, W: Array, Eb: Array, Fb: Array, epsilon: float) -> PostFilter:
+    """The post-filter by Newton's method on a factor of X (X = Z Z'): squares are never formed, so that half the digits are not lost.
+
+    One step: X of the filter Lo in use (a Lyapunov equation), then the Lo that is best for this X. It converges from every stabilising Lo;
+    G is stable, so Lo = 0 is one where scipy finds none, as with poles close to the unit circle.
+    """
+    try:
+        Lo, steps = _filter_of(G, W, Eb, Fb, _riccati(G, W, Eb, Fb), epsilon).Lo, POLISH_STEPS
+        if np.abs(np.linalg.eigvals(G - Lo @ W)).max() >= 1.0:
+            raise np.linalg.LinAlgError("scipy's solution is not the stabilising one")
+    except (np.linalg.LinAlgError, ValueError):
+        Lo, steps = np.zeros((G.shape[0], W.shape[0])), NEWTON_STEPS
+    rows = W.shape[0]
+    Z = root = np.zeros((0, 0))
+    for _ in range(steps):
+        Z = _lyapunov_factor(G - Lo @ W, Eb - Lo @ Fb)
+        low = _triangle(np.vstack([np.hstack([W @ Z, Fb]), np.hstack([G @ Z, Eb])]))
+        root = low[:rows, :rows]  # root root' = S
+        before, Lo = Lo, np.asarray(np.linalg.solve(root.T, low[rows:, :rows].T).T)
+        if np.abs(Lo - before).max() <= 1e-15 * np.abs(Lo).max():
+            break
+    U, sigma, _ = np.linalg.svd(root)
+    if sigma[-1] <= 0.0:
+        raise np.linalg.LinAlgError("S is not positive definite")
+    return PostFilter(Lo, U @ np.diag(1.0 / sigma) @ U.T, Z @ Z.T, root @ root.T, Eb, Fb, epsilon)
+
+
+def _triangle(a: Array) -> Array:
+    """Lower triangular T with T T' = a a'."""
+    upper = np.asarray(np.linalg.qr(a.T, mode="r"))
+    return upper.T
+
+
+def _lyapunov_factor(F: Array, E: Array) -> Array:
+    """Z with Z Z' = sum over j of F^j E E' F'^j, by doubling the number of terms."""
+    Z, power = _triangle(E), F
+    for _ in range(DOUBLINGS):
+        Z = _triangle(np.hstack([Z, power @ Z]))
+        power = power @ power
+        if np.abs(power).max() < 1e-18:
+            return Z
+    raise np.linalg.LinAlgError("a pole on the unit circle")
 
 
 def no_filter(order: int) -> PostFilter:
@@ -162,11 +231,9 @@ def fused(o: ObserverMatrices, f: PostFilter) -> tuple[Array, Array, Array, Arra
     return state, inputs, -mul(f.Mo, o.W), np.hstack([mul(f.Mo, o.V), -mul(f.Mo, o.Qu)])
 
 
-def check_parity(plant: SubPlant, order: int, where: str) -> Array:
-    """The parity basis at this order; refuses an order that has none and says which would do."""
-    basis = parity_basis(plant, order)
-    if basis.size == 0:
+def check_parity(plant: SubPlant, order: int, where: str) -> None:
+    """Refuse an order that has no parity vector and say which would do. One that has, has them at every larger order."""
+    if parity_basis(plant, order).size == 0:
         least = smallest_order(plant, 2 * plant.A.shape[0] + 2)
         cure = f"the smallest order that has one is {least}" if least else "no order has one with these outputs"
         raise InputError(f"{where}: no parity vector at order {order}; {cure}")
-    return basis

@@ -47,14 +47,16 @@ def predict_table(model: Model, index: int, groups: tuple[GroupTable, ...], boun
     at = [model.outputs.index(i) for i in group.signals]
     C, D, Fd = plant.C[at], plant.D[at], plant.Fd[at]
     if D.any():
-        raise InputError(f"{model.path.name}: detector.prediction: group '{group.name}' sees inputs at once (D is not 0), which a frame's values alone cannot tell apart; remove it")
+        where = f"{model.path.name}: detector.prediction: group '{group.name}'"
+        raise InputError(f"{where} sees inputs at once (D is not 0), which a frame's values alone cannot tell apart; remove it")
     S = nearest32(mul(C.T, _inverse(mul(C, C.T))))
     half = np.array([s.half for s in table.signals])
     known = np.array([_half_of(groups, i) for i in model.inputs])
     rounded = _Rounded(plant, C, Fd, S, nearest32(plant.A), nearest32(plant.B), nearest32(C), half, known, bounds)
     settle, hidden = _hidden(rounded, table.interval_max + table.margin)
     if settle is None:
-        raise InputError(f"{model.path.name}: detector.prediction: what group '{group.name}' does not see of the plant is not stable, and no prediction forgets how it began; remove it")
+        where = f"{model.path.name}: detector.prediction: what group '{group.name}' does not see of the plant"
+        raise InputError(f"{where} is not stable, and no prediction forgets how it began; remove it")
     B, places, limits = rounded.B, tuple(model.inputs), known
     if plant.p == 0:
         B, places, limits = np.zeros((plant.n, 1)), (0,), np.array([EXACT])  # the library wants an input: any signal will do, with weight 0

@@ -1,7 +1,13 @@
-"""Search of the free parameters of a generator, parity vector and poles, for the smallest fault that shows; platoon, section 3."""
+"""Search of the free parameters of a generator, order, parity vector and poles, for the faults to show best; platoon, section 3.
+
+Poles matter only where W has more rows than residuals are kept: G = G0 + gamma e_s' and L = L0 - gamma v_s feed r0_s = v_s y - z_s back,
+which is a combination of r0, and the optimal post-filter undoes every such M(z) with M and its inverse stable and M(infinity) = I. Then all
+poles give the same r, and the search leaves them at 0.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,14 +15,30 @@ import numpy as np
 from scipy.optimize import linprog
 
 from hullguard.design.arith import digits
-from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, best_rows, fused, gamma_of, no_filter, output_map, post_filter, structure
+from hullguard.design.observer import (
+    ObserverMatrices,
+    PostFilter,
+    SubPlant,
+    best_rows,
+    disturbance_rank,
+    fused,
+    gamma_of,
+    no_filter,
+    output_map,
+    parity_basis,
+    post_filter,
+    structure,
+)
 from hullguard.errors import InputError
-from hullguard.model.schema import Search
+from hullguard.model.schema import Observer, Search
 from hullguard.model.table import Array
 
 HORIZON = 60  # samples in which a step fault has to show
 LAGS = 2048  # of the impulse response that the score adds up
 SETTLED = 1e-8
+FAR = 0.01  # of its length: how far a chosen parity vector may be from the null space
+NOTHING = 1e3  # cost where there is no generator; more than any that there is
+INVISIBLE = 1e6  # size of a fault that never shows, for the cost
 
 
 @dataclass(frozen=True)
@@ -34,29 +56,32 @@ class Candidate:
     observer: ObserverMatrices
     filter: PostFilter
     smallest: Array  # faults: size whose response reaches the threshold, inf where it never does
+    first: Array  # faults: the same of the first point that the search drew, NaN where there was no search
 
 
-def make(plant: SubPlant, v: Array, poles: Array, residuals: int, paths: list[FaultPath], aware: bool) -> tuple[ObserverMatrices, PostFilter]:
-    """Observer and post-filter of a parity vector (s+1 x m) and poles (s). Raises LinAlgError or ValueError where there is none."""
-    v = digits(v)
-    gamma = digits(gamma_of(poles))
+def make(plant: SubPlant, v: Array, gamma: Array, residuals: int, paths: list[FaultPath], aware: bool, quick: bool = False) -> tuple[ObserverMatrices, PostFilter]:
+    """Observer and post-filter of a parity vector (s+1 x m) and pole vector (s). Raises LinAlgError or ValueError where there is none."""
+    if not quick:
+        v, gamma = digits(v), digits(gamma)
     G, H, L, T = structure(plant, v, gamma)
     W, V = output_map(plant, T)
     if W.shape[0] == 0:
         raise np.linalg.LinAlgError("no output map")
     m = plant.C.shape[0]
+    count = min(residuals, m, W.shape[0])
+    if W.shape[0] > 1:
+        count = min(count, max(1, disturbance_rank(plant, G, H, L, T, W, V, aware)))
     responses = [(T @ p.into_x - L @ p.into_value[:m] - H @ p.into_value[m:], p.into_value[:m]) for p in paths]
-    W, V = best_rows(W, V, G, responses, min(residuals, m))
-    W, V = digits(W), digits(V)
+    W, V = best_rows(W, V, G, responses, count)
+    if not quick:
+        W, V = digits(W), digits(V)
     Qu = V @ plant.D
-    f = post_filter(plant, G, L, H, T, W, V, Qu, aware)
+    f = post_filter(plant, G, L, H, T, W, V, Qu, aware, quick)
     return ObserverMatrices(v, gamma, G, H, L, T, W, V, Qu), f
 
 
-def smallest_faults(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: list[FaultPath], radius: Array) -> Array:
-    """For each fault the size whose largest response within the horizon equals the steady threshold at these radii."""
-    if not paths:
-        return np.zeros(0)
+def step_ratios(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: list[FaultPath], radius: Array) -> Array:
+    """|response| / steady threshold at these radii to a unit step of each fault: samples x residuals x faults."""
     state, inputs, output, direct = fused(o, f)
     m = plant.C.shape[0]
     Bd = o.T @ plant.Ed - inputs[:, :m] @ plant.Fd
@@ -72,9 +97,34 @@ def smallest_faults(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: 
     answers = -R[:HORIZON, :, errors.shape[1] :]
     at_once = np.array([direct @ p.into_value for p in paths]).T
     steps = np.concatenate([at_once[None], at_once + answers.cumsum(0)])
-    peak = (np.abs(steps) / J[None, :, None]).max((0, 1))
+    return np.asarray(np.abs(steps) / J[None, :, None])
+
+
+def _smallest(ratios: Array) -> Array:
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / peak)
+        return np.asarray(1.0 / ratios.max((0, 1)))
+
+
+def smallest_faults(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: list[FaultPath], radius: Array) -> Array:
+    """For each fault the size whose largest response within the horizon equals the steady threshold at these radii."""
+    return _smallest(step_ratios(plant, o, f, paths, radius)) if paths else np.zeros(0)
+
+
+def delays(ratios: Array, size: float) -> Array:
+    """For each fault of this size the samples until its response leaves the steady threshold, between samples by a straight line.
+
+    A fault that does not within the horizon counts as horizon x (what its size would have to be) / size, so that a search has a slope to follow.
+    """
+    largest = size * ratios.max(1)
+    found = np.zeros(largest.shape[1])
+    for j, course in enumerate(largest.T):
+        over = np.flatnonzero(course > 1.0)
+        if len(over) == 0:
+            found[j] = len(course) * min(1.0 / max(float(course.max()), 1e-300), INVISIBLE)
+        elif over[0] > 0:
+            k = int(over[0])
+            found[j] = k - 1 + (1.0 - course[k - 1]) / (course[k] - course[k - 1])
+    return found
 
 
 def between_events(plant: SubPlant, order: int, paths: list[FaultPath], quantum: Array, spoken: Array) -> Candidate:
@@ -130,38 +180,181 @@ def between_events(plant: SubPlant, order: int, paths: list[FaultPath], quantum:
     W[0, -1] = 1.0
     V = v[s:]
     o = ObserverMatrices(v, gamma, G, H, L, T, W, V, V @ plant.D)
-    return Candidate(o, no_filter(s), np.full(len(paths), float(result.fun)))
+    return Candidate(o, no_filter(s), np.full(len(paths), float(result.fun)), np.full(len(paths), np.nan))
 
 
-def _draw(rng: np.random.Generator, plant: SubPlant, basis: Array, order: int, poles: tuple[float, float]) -> tuple[Array, Array]:
-    v = (rng.standard_normal(basis.shape[0]) @ basis).reshape(order + 1, plant.C.shape[0])
-    return v, rng.uniform(*poles, order)
+def fault_delays(plant: SubPlant, o: ObserverMatrices, f: PostFilter, paths: list[FaultPath], radius: Array, size: float) -> Array:
+    """delays() of a generator; infinite where the fault does not show within the horizon."""
+    if not paths:
+        return np.zeros(0)
+    found = delays(step_ratios(plant, o, f, paths, radius), size)
+    return np.where(found < HORIZON + 1, found, np.inf)
 
 
-def search(
-    plant: SubPlant, basis: Array, order: int, residuals: int, paths: list[FaultPath], radius: Array, aware: bool, setting: Search, tick: Callable[[int, int], None]
-) -> Candidate:
-    """Random trials for two thirds of the budget, then steps around the best; the same seed gives the same result on one machine."""
-    rng = np.random.default_rng(setting.seed)
-    best: Candidate | None = None
-    centre: tuple[Array, Array] | None = None
-    step = 0.3
-    for trial in range(setting.trials):
-        tick(trial + 1, setting.trials)
-        if centre is None or 3 * trial < 2 * setting.trials:
-            v, poles = _draw(rng, plant, basis, order, setting.poles)
+def project(plant: SubPlant, parity: Array, where: str) -> Array:
+    """The chosen parity vector without what rounding left outside the null space; refused when that is much."""
+    s = parity.shape[0] - 1
+    blocks = [plant.C]
+    for _ in range(s):
+        blocks.append(blocks[-1] @ plant.A)
+    basis, flat = np.vstack(blocks), parity.ravel()
+    inside = flat - basis @ np.linalg.lstsq(basis, flat, rcond=None)[0]
+    off = float(np.linalg.norm(flat - inside) / np.linalg.norm(flat))
+    if off > FAR:
+        raise InputError(
+            f"{where}.parity: {off:.2g} of its length is outside the left null space of [C; CA; ..; CA^{s}], at most {FAR:g} can be rounding; "
+            "check the order of rows (v0 first) and outputs, or leave it to the search"
+        )
+    return inside.reshape(parity.shape)
+
+
+def poles_from(x: Array, low: float, high: float) -> Array:
+    """Any point becomes poles: of each pair of numbers the first is their middle, the second apart on the real line (> 0) or conjugate (< 0).
+
+    Real poles and real parts stay within low .. high, magnitudes below the larger of both.
+    """
+    half, largest = (high - low) / 2, max(abs(low), abs(high))
+    poles: list[complex] = []
+    for a, b in zip(x[0::2], np.append(x[1::2], 0.0), strict=False):
+        centre = low + half + half * math.tanh(a)
+        room = half - abs(centre - low - half) if b > 0 else math.sqrt(max(largest**2 - centre**2, 0.0))
+        apart = (room * math.tanh(abs(b))) * (1.0 if b > 0 else 1j)
+        poles += [centre + apart, centre - apart]
+    return np.array(poles[: len(x)] if len(x) % 2 == 0 else [*poles[: len(x) - 1], poles[-1].real])
+
+
+class Problem:
+    """The free parameters of one order as one vector, and what a point of it costs."""
+
+    def __init__(self, plant: SubPlant, order: int, spec: Observer, paths: list[FaultPath], radius: Array, where: str) -> None:
+        self.plant, self.order, self.spec, self.paths, self.radius = plant, order, spec, paths, radius
+        self._shape = (order + 1, plant.C.shape[0])
+        if spec.parity is None:
+            self._basis = parity_basis(plant, order)
+            rows = self._basis.shape[0]
+            self.free_parity = rows if rows > 1 else 0  # the length of v does not matter
         else:
-            dv, _ = _draw(rng, plant, basis, order, setting.poles)
-            v = centre[0] + step * np.linalg.norm(centre[0]) / np.linalg.norm(dv) * dv
-            poles = np.clip(centre[1] + 0.2 * step * rng.standard_normal(order), *setting.poles)
-            step = max(step * 0.995, 0.01)
+            v = project(plant, np.array(spec.parity), where)
+            self._basis, self.free_parity = v.reshape(1, -1) / np.linalg.norm(v), 0
+        self.free_poles = order if spec.poles is None and self._poles_matter() else 0
+        self.size = self.free_parity + self.free_poles
+
+    def _poles_matter(self) -> bool:
+        """Whether W has more rows than are kept."""
+        v = self._basis.sum(0).reshape(self._shape)
+        _, _, _, T = structure(self.plant, v, np.zeros(self.order))
+        rows = int(output_map(self.plant, T)[0].shape[0])
+        return rows > min(self.spec.residuals, int(self.plant.C.shape[0]))
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """A random point."""
+        return np.asarray(rng.standard_normal(self.size))
+
+    def parameters(self, x: Array) -> tuple[Array, Array]:
+        """Parity vector, of length 1, and pole vector of a point."""
+        v = x[: self.free_parity] @ self._basis if self.free_parity else self._basis[0]
+        if self.spec.poles is not None:
+            poles = np.array(self.spec.poles[: self.order])
+        elif self.free_poles:
+            poles = poles_from(x[self.free_parity :], *self.spec.search.poles)
+        else:
+            poles = np.zeros(self.order)
+        return (v / np.linalg.norm(v)).reshape(self._shape), gamma_of(poles)
+
+    def made(self, x: Array, quick: bool) -> tuple[ObserverMatrices, PostFilter]:
+        """Observer and post-filter of a point."""
+        return make(self.plant, *self.parameters(x), self.spec.residuals, self.paths, self.spec.aware, quick)
+
+    def cost(self, x: Array) -> tuple[float, Array]:
+        """What the search makes small, and the smallest faults."""
         try:
-            o, f = make(plant, v, poles, residuals, paths, aware)
+            o, f = self.made(x, quick=True)
+            ratios = step_ratios(self.plant, o, f, self.paths, self.radius) if self.paths else np.ones((1, 1, 0))
         except (np.linalg.LinAlgError, ValueError):
-            continue
-        smallest = smallest_faults(plant, o, f, paths, radius)
-        if best is None or (paths and smallest.max() < best.smallest.max()):
-            best, centre = Candidate(o, f, smallest), (v, poles)
-    if best is None:
-        raise InputError("the search found no generator: more trials, other poles or another order may")
-    return best
+            return NOTHING, np.zeros(0)
+        smallest = _smallest(ratios)
+        if not self.paths:
+            return 0.0, smallest
+        setting: Search = self.spec.search
+        asked = delays(ratios, setting.size).mean() if setting.objective == "delay" else smallest.max()
+        # The logarithm: a scale that the unit of a fault does not change.
+        return math.log(min(max(float(asked), 1.0 / INVISIBLE), INVISIBLE)), smallest
+
+
+class _SpentError(Exception):
+    """The budget of trials is used up."""
+
+
+class _Trials:
+    """Counts trials and keeps the best point."""
+
+    def __init__(self, problem: Problem, tick: Callable[[], None]) -> None:
+        self.problem, self._tick, self.left = problem, tick, 0
+        self.best: Array | None = None
+        self.lowest, self.first = NOTHING, np.zeros(0)
+
+    def __call__(self, x: Array) -> float:
+        if self.left == 0:
+            raise _SpentError
+        self.left -= 1
+        self._tick()
+        cost, smallest = self.problem.cost(x)
+        if cost < self.lowest:
+            self.lowest, self.best = cost, x.copy()
+        if not self.first.size and cost < NOTHING:
+            self.first = smallest
+        return cost
+
+    def minimise(self, rng: np.random.Generator, budget: int) -> None:
+        """CMA-ES from the best of a few random points, again from others with twice the population while trials are left."""
+        import cma  # here: it takes as long to load as all the rest, and few commands search
+
+        self.left += budget
+        problem, population = self.problem, 0
+        try:
+            while problem.size > 1 and problem.paths:
+                points = [problem.draw(rng) for _ in range(max(1, budget // 10))]
+                if self.best is not None and not population:
+                    points[0] = self.best  # a second helping goes on where the first one ended
+                start = points[int(np.argmin([self(x) for x in points]))]
+                step = 0.5 * float(np.linalg.norm(start)) / math.sqrt(problem.size)
+                options = {"randn": lambda *shape: rng.standard_normal(shape), "seed": math.nan, "verbose": -9, "tolfun": 1e-5, "tolx": 1e-5}
+                run = cma.CMAEvolutionStrategy(start, step, options | ({"popsize": population} if population else {}))
+                while not run.stop():
+                    asked = run.ask()
+                    run.tell(asked, [self(x) for x in asked])
+                population = 2 * int(run.popsize)
+            # Without a choice, or with nothing to compare by, the first generator is as good as any.
+            while self.best is None or (problem.size == 1 and problem.paths):
+                self(problem.draw(rng))
+                if problem.size == 0:
+                    return
+        except _SpentError:
+            pass
+
+
+def search(plant: SubPlant, spec: Observer, paths: list[FaultPath], radius: Array, where: str, tick: Callable[[int, int], None]) -> Candidate:
+    """The best generator within the budget of trials; half of it chooses the order where there is a choice. The same seed gives the same result on one machine."""
+    orders = [s for s in range(spec.order, spec.order_max + 1) if parity_basis(plant, s).size]
+    rng, budget, done = np.random.default_rng(spec.search.seed), max(spec.search.trials, 2 * len(orders)), 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        tick(done, budget)
+
+    trials = [_Trials(Problem(plant, s, spec, paths, radius, where), step) for s in orders]
+    share = budget if len(orders) == 1 else budget // (2 * len(orders))
+    for t in trials:
+        t.minimise(rng, share)
+    best = min(trials, key=lambda t: t.lowest)
+    if len(orders) > 1 and best.best is not None:
+        best.minimise(rng, budget - done)
+    if best.best is None:
+        raise InputError(f"{where}: found no generator: more trials, other poles or another order may")
+    try:
+        o, f = best.problem.made(best.best, quick=False)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise InputError(f"{where}: the post-filter of the best generator cannot be solved ({error}); another seed, other poles or another order may do") from error
+    first = next(t.first for t in trials if t.best is not None) if best.problem.size else np.full(len(paths), np.nan)
+    return Candidate(o, f, smallest_faults(plant, o, f, paths, radius), first)

@@ -13,7 +13,7 @@ import tomli_w
 from hullguard.errors import InputError
 from hullguard.model.table import Array, Table
 
-VERSION = 2  # rises when the same model would give other numbers
+VERSION = 3  # rises when the same model would give other numbers
 HEADER = "# Made by `hullguard design` from {name}.toml. Do not edit: run it again.\n\n"
 
 
@@ -29,6 +29,7 @@ class StoredObserver:
     Mo: Array
     regularised: float
     smallest: Array
+    first: Array  # smallest faults of the search's first draw, NaN where nothing was searched for
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ def write(path: Path, name: str, stored: Stored) -> None:
                 "regularised": o.regularised,
                 "smallest_fault": [float(x) if np.isfinite(x) else -1.0 for x in o.smallest],
             }
+            | ({} if np.isnan(o.first).any() else {"smallest_fault_first_draw": [float(x) if np.isfinite(x) else -1.0 for x in o.first]})
             for o in stored.observers
         ],
     }
@@ -99,6 +101,7 @@ def read(path: Path) -> Stored | None:
         W = t.matrix("W", None, order)
         rows = W.shape[0]
         smallest = t.vector("smallest_fault")
+        first = t.vector("smallest_fault_first_draw", len(smallest)) if "smallest_fault_first_draw" in t else np.full(len(smallest), np.nan)
         observers.append(
             StoredObserver(
                 v=v,
@@ -109,6 +112,7 @@ def read(path: Path) -> Stored | None:
                 Mo=t.matrix("Mo", rows, rows),
                 regularised=t.number("regularised", 0.0),
                 smallest=np.where(smallest < 0, np.inf, smallest),
+                first=np.where(first < 0, np.inf, first),
             )
         )
         t.close()

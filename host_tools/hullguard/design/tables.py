@@ -164,8 +164,13 @@ class Tables:
         return max((b.window for b in self.banks), default=0)
 
     @property
+    def judging(self) -> tuple[GeneratorTable | BankTable, ...]:
+        """Residual generators, then banks: what the decision listens to."""
+        return (*self.generators, *self.banks)
+
+    @property
     def judged(self) -> int:
-        """Residual generators and banks."""
+        """How many they are."""
         return len(self.generators) + len(self.banks)
 
     @property

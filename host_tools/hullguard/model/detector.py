@@ -56,6 +56,12 @@ def _read_bank(t: Table, key: str, size: int) -> BankSpec | None:
     sizes = tuple(float(x) for x in inner.vector("sizes")) if "sizes" in inner else (0.5, 1.0, 2.0)
     if not sizes or min(sizes) <= 0.0:
         raise inner.error("sizes", "expected sizes of faults above 0, signal units; both signs are tried")
-    spec = BankSpec(inner.whole("size", 1, CERTIFICATES_MAX, size), inner.whole("window", 2, 200, 30), inner.whole("seed", 0, 2**32 - 1, 1), inner.whole("runs", 1, 1000, 12), sizes)
+    spec = BankSpec(
+        size=inner.whole("size", 1, CERTIFICATES_MAX, size),
+        window=inner.whole("window", 2, 200, 30),
+        seed=inner.whole("seed", 0, 2**32 - 1, 1),
+        runs=inner.whole("runs", 1, 1000, 12),
+        sizes=sizes,
+    )
     inner.close()
     return spec

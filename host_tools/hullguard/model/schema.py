@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.errors import InputError
+from hullguard.model.choice import read_orders, read_parity, read_poles
 from hullguard.model.detector import DetectorSpec, read_detector
 from hullguard.model.faults import FaultSpec, parse_fault
 from hullguard.model.plant import Plant, read_plant
@@ -83,23 +84,32 @@ class Group:
 class Search:
     """How the free parameters of a generator are looked for."""
 
-    objective: str  # "smallest fault" | "between events"
+    objective: str  # "smallest fault" | "delay" | "between events"
     trials: int
     seed: int
     poles: tuple[float, float]
+    size: float  # of the step whose delay is minimised, in the unit of the faulty signal
 
 
 @dataclass(frozen=True)
 class Observer:
     """One residual generator that the design has to find."""
 
-    order: int
+    order: int  # the smallest one to try; in a finished design the one that was found
+    order_max: int
     residuals: int
     outputs: tuple[int, ...]  # indices into y
     inputs: tuple[int, ...]  # indices into u
     faults: tuple[int, ...]  # indices into the model's faults: what it is searched for
     aware: bool  # trigger-aware post-filter
     search: Search
+    parity: tuple[tuple[float, ...], ...] | None  # order + 1 x outputs: chosen, not searched for
+    poles: tuple[complex, ...] | None  # order: chosen, not searched for
+
+    @property
+    def chosen(self) -> bool:
+        """Whether the model leaves nothing to a search."""
+        return self.parity is not None and self.poles is not None
 
     @property
     def filtered(self) -> bool:
@@ -135,6 +145,7 @@ class Scenario:
     reference: Reference
     faults: tuple[FaultSpec, ...]
     set: dict[str, Any] = field(default_factory=dict)
+    figures: str = ""  # "published": the report of a run begins with the publication's four figures
 
 
 @dataclass(frozen=True)
@@ -529,23 +540,21 @@ def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tup
             for n in chosen[key]:
                 if n not in known:
                     raise o.error(key, f"'{n}' is not one of {', '.join(known) or 'none'}")
-        s = o.table("search", optional=True)
-        poles = s.vector("poles", 2) if "poles" in s else np.array([0.0, 0.9])
-        if not -1.0 < poles[0] <= poles[1] < 1.0:
-            raise s.error("poles", "expected [smallest, largest] inside the unit circle: -1 .. 1")
-        objective = s.text("objective", "smallest fault", ["smallest fault", "between events"])
-        search = Search(objective, s.whole("trials", 1, 1_000_000, 1000), s.whole("seed", 0, 2**32 - 1, 1), (float(poles[0]), float(poles[1])))
-        s.close()
+        search = _read_search(o.table("search", optional=True))
+        least, most = read_orders(o, search)
         names = [f.name for f in faults]
         observers.append(
             Observer(
-                order=o.whole("order", 1, 40),
+                order=least,
+                order_max=most,
                 residuals=o.whole("residuals", 1, 16),
                 outputs=tuple(outputs.index(n) for n in chosen["outputs"]),
                 inputs=tuple(inputs.index(n) for n in chosen["inputs"]),
                 faults=tuple(names.index(n) for n in chosen["faults"]),
                 aware=o.flag("trigger_aware", True),
                 search=search,
+                parity=read_parity(o, least, most, len(chosen["outputs"]), search),
+                poles=read_poles(o, least, most, search),
             )
         )
         o.close()
@@ -553,6 +562,24 @@ def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tup
         raise t.error("observers", f"{len(observers)} residual generators; {int(needed)} .. {GENERATORS_MAX} are possible")
     t.close()
     return tuple(observers)
+
+
+def _read_search(s: Table) -> Search:
+    poles = s.vector("poles", 2) if "poles" in s else np.array([0.0, 0.9])
+    if not -1.0 < poles[0] <= poles[1] < 1.0:
+        raise s.error("poles", "expected [smallest, largest] inside the unit circle: -1 .. 1")
+    objective = s.text("objective", "smallest fault", ["smallest fault", "delay", "between events"])
+    if objective != "delay" and "size" in s:
+        raise s.error("size", 'only objective = "delay" looks for a fault of a size; remove it')
+    search = Search(
+        objective=objective,
+        trials=s.whole("trials", 1, 1_000_000, 1000),
+        seed=s.whole("seed", 0, 2**32 - 1, 1),
+        poles=(float(poles[0]), float(poles[1])),
+        size=s.number("size", 1e-9, default=1.0),
+    )
+    s.close()
+    return search
 
 
 def _read_verdict(t: Table, groups: tuple[Group, ...]) -> tuple[Frame, Frame, int, int, int, bool]:
@@ -591,7 +618,8 @@ def _read_scenarios(top: Table, path: Path) -> tuple[Scenario, ...]:
         overrides = t.raw("set") if "set" in t else {}
         if not isinstance(overrides, dict):
             raise t.error("set", "expected a table of KEY = VALUE")
-        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides))
+        figures = t.text("figures", "", ["published"])
+        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides, figures))
         t.close()
     if not scenarios:
         scenarios.append(Scenario("default", 200, Reference("rest", 0.0, 1), ()))

@@ -18,7 +18,9 @@ import numpy as np
 
 from hullguard.bus import candump
 from hullguard.bus.link import CanLink
+from hullguard.core.library import library
 from hullguard.core.native import REST, Frame, Native, Node, Sender, Verdict, frame_bits, read_verdict
+from hullguard.core.pair import Pair
 from hullguard.design.design import Design
 from hullguard.errors import BusError, ExpectationError
 from hullguard.model.faults import FaultSpec
@@ -339,6 +341,13 @@ def _changes(groups: Sequence[Any], verdicts: Sequence[Verdict]) -> list[dict[st
     return changes
 
 
+def before_filter(design: Design, trace: Trace) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Residuals before the post-filter, from the values that the detector held: samples x residuals, generators one after another."""
+    values = np.array(trace.value)
+    made = [Pair(library("f64"), g).run(values[:, list(t.signal)])[0] for g, t in zip(design.generators, design.tables.generators, strict=True)]
+    return np.hstack(made)
+
+
 def write_files(directory: Path, design: Design, native: Native, trace: Trace, faults: Sequence[FaultSpec], result: dict[str, Any]) -> None:
     """run.json, signals.csv and labels.csv: all that a report or a doubt needs."""
     model, tables = design.model, native.tables
@@ -347,7 +356,9 @@ def write_files(directory: Path, design: Design, native: Native, trace: Trace, f
     names = [s.name for s in model.signals]
     residuals = [f"{g + 1}.{i + 1}" for g, t in enumerate(tables.generators) for i in range(len(t.output))]
     header = ["time_s", "k"] + [c for n in names for c in (n, f"{n}.value", f"{n}.radius")]
-    header += [c for x in residuals for c in (f"r{x}", f"J{x}")] + ["plant"] + [f"event.{g.name}" for g in tables.groups] + ["bits"]
+    before = before_filter(design, trace) if result.get("figures") else np.zeros((len(trace.verdict), 0))
+    header += [c for x in residuals for c in (f"r{x}", f"J{x}")] + [f"before{x}" for x in residuals if before.size]
+    header += ["plant"] + [f"event.{g.name}" for g in tables.groups] + ["bits"]
     codes = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
     with (directory / "signals.csv").open("w", encoding="utf-8") as file:
         file.write(",".join(header) + "\n")
@@ -357,6 +368,7 @@ def write_files(directory: Path, design: Design, native: Native, trace: Trace, f
                 row += [f"{trace.reading[k][i]:.9g}", f"{trace.value[k][i]:.9g}", f"{trace.radius[k][i]:.9g}"]
             for r, J in zip(trace.r[k], trace.J[k], strict=True):
                 row += [f"{r:.9g}", f"{J:.9g}"]
+            row += [f"{x:.9g}" for x in before[k]]
             row += [str(codes[v.plant])] + [str(int(g in trace.events[k])) for g in range(len(tables.groups))] + [str(trace.bits[k])]
             file.write(",".join(row) + "\n")
     with (directory / "labels.csv").open("w", encoding="utf-8") as file:

@@ -245,8 +245,7 @@ def _generator(design: Design, i: int, g: Generator) -> Iterator[str]:
     feeds = [group.name for k, group in enumerate(model.groups) if design.tables.generators[i].feeds >> k & 1]
     sources = ", ".join(feeds) or "no group"
     yield (
-        f"<p>Order {g.spec.order} for {plural(model.plant.n, 'state')}, {plural(residuals, 'residual')}; reads {esc(', '.join(names))}; fed by {esc(sources)}. "
-        f"Search: {plural(g.spec.search.trials, 'trial')}, seed {g.spec.search.seed}, poles {num(g.spec.search.poles[0])} .. {num(g.spec.search.poles[1])}.</p>"
+        f"<p>Order {g.spec.order} for {plural(model.plant.n, 'state')}, {plural(residuals, 'residual')}; reads {esc(', '.join(names))}; fed by {esc(sources)}. {esc(_how(g))}</p>"
     )
     if g.filter.regularised > 0:
         yield f"<p><b>The factorisation was singular and is regularised</b>: noise of size {num(g.filter.regularised)} that no one claims was added to each row of Fb.</p>"
@@ -266,20 +265,37 @@ def _generator(design: Design, i: int, g: Generator) -> Iterator[str]:
     yield f"<details><summary>Matrices G, H, L, T, W, V, Qu, Lo, Mo</summary>{text}</details>" if max(m.shape[1] for m in named.values()) > LARGE else text
 
 
+def _how(g: Generator) -> str:
+    """Where the free parameters come from."""
+    spec, s = g.spec, g.spec.search
+    if not spec.filtered:
+        return "A linear programme found the parity vector; poles 0."
+    if spec.chosen:
+        return "Parity vector and poles are the model's own choice."
+    chosen = " The parity vector is the model's own choice." if spec.parity is not None else " The poles are the model's own choice." if spec.poles is not None else ""
+    return f"Search: {s.objective}, {plural(s.trials, 'trial')}, seed {s.seed}, poles {num(s.poles[0])} .. {num(s.poles[1])} where they matter.{chosen}"
+
+
 def _search(design: Design, g: Generator) -> str:
     rows = []
-    for f, size, blind in zip(g.spec.faults, g.smallest, g.blind, strict=True):
-        gain = f"{num(blind / size)} times smaller" if np.isfinite(size) and np.isfinite(blind) and size > 0 else "–"
+    for f, size, first, blind, delay in zip(g.spec.faults, g.smallest, g.first, g.blind, g.delay, strict=True):
         fault = design.model.faults[f]
-        rows.append([fault.name, design.model.signals[fault.signal].name, float(size), float(blind), gain])
+        rows.append([fault.name, design.model.signals[fault.signal].name, float(size), *_gain(size, first), *_gain(size, blind), float(delay)])
     if not rows:
         return "<p>No fault was asked for in the search.</p>"
     aware = "aware of the trigger" if g.spec.aware else "as designed, not aware of the trigger"
     return table(
-        ["fault", "of signal", f"#post-filter {aware}", "#not aware of it", "#gain"],
+        ["fault", "of signal", f"#post-filter {aware}", "#search's first draw", "#gain", "#not aware of the trigger", "#gain", f"#delay at {num(g.spec.search.size)} (samples)"],
         rows,
-        "What the search reached: the smallest lasting step, in the signal's unit, whose residual reaches the steady threshold.",
+        "What the search reached: the smallest lasting step, in the signal's unit, whose residual reaches the steady threshold. A dash: nothing was searched for, or "
+        "the bounds have changed since.",
     )
+
+
+def _gain(size: float, other: float) -> tuple[float, str]:
+    """Another design's smallest fault, and how much smaller this one's is."""
+    known = np.isfinite(size) and np.isfinite(other) and size > 0
+    return float(other), f"{num(other / size)} times smaller" if known else "–"
 
 
 def shares(g: Generator) -> tuple[Array, Array, Array]:

@@ -83,6 +83,7 @@ class Run:
     bits: Array
     signals: tuple[SignalRun, ...]
     residuals: tuple[Residual, ...]
+    before: tuple[Array, ...]  # each residual before its post-filter; none where the run did not ask for them
     groups: tuple[GroupRun, ...]
     faults: tuple[FaultRun, ...]
     verdicts: tuple[tuple[int, str, dict[str, str]], ...]
@@ -321,6 +322,8 @@ def read_run(directory: Path) -> Run:
     for key in ("communication", "events"):
         top.object(key)
     top.maybe("margin_max")
+    residuals = _residuals(column, where)
+    before = tuple(_column(column, f"before{r.name[1:]}", where) for r in residuals) if top.data.get("figures") else ()
     sample_time_s, bitrate = top.number("sample_time_s"), top.number("bitrate")
     if sample_time_s <= 0 or bitrate <= 0:
         raise InputError(f"{path}: 'sample_time_s' and 'bitrate' must be above 0")
@@ -335,7 +338,8 @@ def read_run(directory: Path) -> Run:
         bus=_bus(verdicts, groups, k),
         bits=_column(column, "bits", where),
         signals=signals,
-        residuals=_residuals(column, where),
+        residuals=residuals,
+        before=before,
         groups=groups,
         faults=_faults(top, labels),
         verdicts=verdicts,

@@ -251,8 +251,8 @@ def _residual_limit(r: Residual, w: Window, plant: Array) -> float:
     return max(1.35 * usual, min(1.1 * largest, 4.0 * usual), 1e-12)
 
 
-def draw_residual(ax: Axes, run: Run, w: Window, r: Residual) -> None:
-    """One residual within its threshold."""
+def draw_residual(ax: Axes, run: Run, w: Window, r: Residual, name: str = "") -> None:
+    """One residual within its threshold, under another name if there is one."""
     t, rows = run.time[w.rows], w.rows
     _limits(ax, run, w)
     top = _residual_limit(r, w, run.plant)
@@ -273,7 +273,7 @@ def draw_residual(ax: Axes, run: Run, w: Window, r: Residual) -> None:
         if first is not None
         else f"largest |r|/J {quiet.max(initial=0.0):.2f}"
     )
-    _heading(ax, r.name, more + (", cut at the frame" if cut else ""))
+    _heading(ax, name or r.name, more + (", cut at the frame" if cut else ""))
 
 
 def residual_legend(run: Run) -> list[Artist]:

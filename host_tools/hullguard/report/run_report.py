@@ -9,6 +9,7 @@ import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hullguard.errors import InputError
+from hullguard.report import published
 from hullguard.report import run_figures as draw
 from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
 from hullguard.report.run_data import FaultRun, Run, read_run
@@ -76,6 +77,8 @@ def _body(run: Run) -> Iterator[str]:
     whole = draw.whole(run)
     many = len({r.generator for r in run.residuals})
     shown, hidden, generators = draw.chosen_residuals(run)
+    if run.before:
+        yield from published.section(run)
 
     yield "<h2>Residuals and thresholds</h2>"
     left = ""
