@@ -12,6 +12,7 @@
 #include "hullguard/hold.h"
 #include "hullguard/residual.h"
 #include "hullguard/hull.h"
+#include "hullguard/zonotope.h"
 #include "hullguard/decision.h"
 #include "hullguard/detector.h"
 #include "hullguard/e2e.h"

@@ -2,18 +2,18 @@
  *  The threshold by a zonotope, an alternative to hull.h with a state of fixed size: the set in which e = T x - z of a residual generator
  *  lies without a fault, moved on sample by sample (methods, platoon, section 5). In modal coordinates e = S e~ it is
  *
- *      Z(k+1) = reduce([Lam Z, P diag(radius), B'], q)        J = |Q [Z, P-free directions]| 1 + |direct| radius + bias
+ *      Z(k+1) = reduce([Lam Z, P diag(radius), B'], q)        J = |Q Z| 1 + |direct| radius + bias
  *
  *  with Lam = S^-1 G' S block diagonal, P the event errors' and B' the disturbances' columns, Q the residuals' rows. Disturbances and the
  *  initial set do not depend on data: they may be columns of Z, as published, or, much tighter for the same q, rows of the bias tables.
  *
- *  The set is kept as columns and, around their sum, one ball a block of Lam: |Euclid| <= ball for a block of two rows (a complex pair),
- *  |largest entry| <= ball for others. The ball holds what has no direction: rounding, table mismatch, radii found too small later,
+ *  The set is kept as columns and, around their sum, one ball a block of Lam: Euclid's norm <= spread for a block of two rows (a complex
+ *  pair), the largest entry <= spread for others. The ball holds what has no direction: rounding, table mismatch, radii found too small later,
  *  and, with HG_REDUCTION_BALL, the columns that had to go. A ball shrinks with |Lam| of its block and never wraps.
  *
  *  Sound with HG_REDUCTION_BOX and _BALL: J is never below the exact sum of section 6, in float32 and float64. Each rounding is covered:
  *  - Lam c, S itself, and the generator's own arithmetic err in a block by at most a share of the sum of all magnitudes, size(k) =
- *    sum |c|1 + sum rows ball: growth[] size goes into the balls each step. It includes what the sums of norms and size itself lose;
+ *    sum |c|1 + sum rows spread: growth[] size goes into the balls each step. It includes what the sums of norms and size itself lose;
  *  - products that underflow err by less than always[], which goes in as well;
  *  - decay[], outer[], direct[] and bias are rounded up, and these, with output[], are made larger by more than any sum of so many terms
  *    can lose; output_growth[] size covers that output[] is rounded to nearest.
@@ -71,8 +71,9 @@ typedef struct {                       /* RAM: one a generator */
     const hg_zonotope_config *config;
     hg_real                  *column;  /* [q + fresh][order] */
     hg_real                  *score;   /* [q + fresh] scratch */
-    hg_real                  *ball;    /* [blocks] */
+    hg_real                  *spread;  /* [blocks] size of each ball */
     hg_real                  *scratch; /* [order] */
+    hg_real                   size;    /* size(k), finite */
     uint16_t                  count;   /* columns in use */
     uint16_t                  lost;    /* samples until a set that overflowed is forgotten */
     uint16_t                  k;       /* samples since the start, saturated */
@@ -109,7 +110,7 @@ void hg_zonotope_widen(hg_zonotope *self, uint8_t lag, uint8_t first, uint8_t co
 /** Threshold of this sample, whose radii are the newest row of the ring; then the set moves on with them.
  *  @param[out] J  [residuals] > 0 where the bias is; HG_REAL_MAX where it is larger
  *  Cost, N = q + width + disturbances: N (residuals order + sum of block squares) multiplications, and for the selection at most
- *  N (1 + log2 q) comparisons and as many moves of a column: a heap, so the worst case is bounded whatever the data are. */
+ *  2 N (1 + log2 q) comparisons and half as many swaps of two columns, whatever the data are: it is a heap. */
 void hg_zonotope_step(hg_zonotope *self, const hg_radii *ring, hg_real *J);
 
 /** Has the initial state become a small part of J, and is the set a bounded one? */
