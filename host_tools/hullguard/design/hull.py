@@ -75,7 +75,7 @@ class Rounding:
     behind: Array  # residuals: what later lags can add for radii as wide as the ranges
 
 
-def _rounding(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, lags: int) -> Rounding:
+def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, lags: int) -> Rounding:
     """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius."""
     s, width = lin.input.shape
     m = plant.C.shape[0]
@@ -165,7 +165,7 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
     weights = np.concatenate([np.abs(lin.direct)[None], np.abs(np.array([mul(f, lin.input) for f in F]))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
-    loss = _rounding(lin, T, plant, ranges, Bd, min(length, LAGS_MAX))
+    loss = rounding_of(lin, T, plant, ranges, Bd, min(length, LAGS_MAX))
     lags = loss.weight.shape[0]
     weights[:lags] += loss.weight
     steps = np.array([mul(np.abs(f), loss.into_e[:, None])[:, 0] for f in F])

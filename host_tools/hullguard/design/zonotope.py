@@ -1,0 +1,284 @@
+"""Tables of the zonotope threshold; platoon, sections 5 and 8.
+
+With the generator as the ECU runs it, z(k+1) = Gr z + Er v, r = Fr z + Dr v, and e = T x - z,
+
+    e(k+1) = Gr e + Bd d - Er ev + ..        r = -Fr e + Dd d + Dr ev + ..
+
+a transform Y of few digits, e~ = Y e, makes Y Gr Y^-1 block diagonal but for what rounding leaves; Lam are its blocks in float32. Nothing
+here has to be exact: what the stored numbers miss is computed from them and bounded (`growth`, `output_growth`), as shares of the sum of all
+magnitudes in the set. Rows are scaled by powers of 2 so that the set is of size 1 in each block at the usual radii.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from hullguard.design import hull
+from hullguard.design.arith import U32, digits, mul, nearest32, row_sums, up32
+from hullguard.design.observer import SubPlant
+from hullguard.design.tables import rows
+from hullguard.design.zonotope_table import BOX, ZonotopeTable
+from hullguard.errors import InputError
+from hullguard.model.table import Array
+
+CONDITION_MAX = 1e5  # of eigenvectors of length 1: beyond, poles count as defective
+START_DIGITS = 6  # of the transform that the solver leaves: few, so that every processor starts from the same numbers
+REFINEMENTS = 3  # each squares the error of the transform
+U64 = 2.0**-53
+HEALED = 1e-6  # of a set of size 1: what an overflow may leave behind when it is forgotten
+SHARE_MAX = 0.1  # what rounding may add to the set
+LARGEST = np.log(np.finfo(np.float64).max)  # radii of either number type
+NEVER = 65535
+
+
+@dataclass(frozen=True)
+class Modal:
+    """e~ = transform e; transform G inverse is block diagonal, nearly. |transform^-1| <= magnitude, entry by entry."""
+
+    transform: Array  # order x order
+    inverse: Array  # order x order
+    magnitude: Array  # order x order
+    off: float  # |transform^-1 - inverse| <= off times the row sums of |inverse|
+    block: tuple[int, ...]
+
+
+def _solve(a: Array, b: Array) -> Array:
+    """A^-1 B by elimination with pivots, in a stated order; infinite where A is singular."""
+    n = len(a)
+    work = np.hstack([a, b])
+    for i in range(n):
+        pivot = i + int(np.argmax(np.abs(work[i:, i])))
+        if work[pivot, i] == 0.0:
+            return np.full(b.shape, np.inf)
+        work[[i, pivot]] = work[[pivot, i]]
+        work[i] = work[i] / work[i, i]
+        for j in range(n):
+            if j != i:
+                work[j] = work[j] - work[j, i] * work[i]
+    return work[:, n:]
+
+
+def _places(block: tuple[int, ...]) -> list[slice]:
+    """Rows of each block."""
+    ends = np.cumsum(block)
+    return [slice(int(e) - b, int(e)) for b, e in zip(block, ends, strict=True)]
+
+
+def _eigenvectors(state: Array) -> tuple[Array, tuple[int, ...]] | None:
+    """Real rows Y with Y G = Lam Y, slow poles first; None where there are too few that are independent."""
+    values, left = np.linalg.eig(state.T)
+    if np.linalg.cond(left) > CONDITION_MAX:
+        return None
+    found: list[Array] = []
+    block: list[int] = []
+    for i in sorted(range(len(values)), key=lambda i: (-round(float(abs(values[i])), 9), -round(float(values[i].real), 9), i)):
+        if values[i].imag < 0.0:
+            continue  # its conjugate stands for both
+        w = left[:, i]
+        largest = w[int(np.argmax(np.round(np.abs(w), 9)))]
+        w = w * (abs(largest) / largest)
+        found += [w.real, w.imag] if values[i].imag > 0.0 else [w.real]
+        block.append(2 if values[i].imag > 0.0 else 1)
+    return np.array(found), tuple(block)
+
+
+def _contracting(state: Array, where: str) -> Array:
+    """Rows Y in which all of G is one block that shrinks the largest entry: Schur's triangle, scaled until its upper part is small."""
+    triangle, U = scipy.linalg.schur(state)
+    for exponent in range(15):
+        scale = 2.0 ** (-exponent * np.arange(len(state)))
+        if _norm(triangle * scale[None, :] / scale[:, None]) < (1 + np.abs(np.linalg.eigvals(state)).max()) / 2:
+            break
+    else:
+        raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
+    Y = U.T / scale[:, None]
+    return np.asarray(Y * np.sign(Y[np.arange(len(Y)), np.argmax(np.round(np.abs(Y), 9), axis=1)])[:, None])
+
+
+def _refined(Y: Array, state: Array, block: tuple[int, ...]) -> Array:
+    """One step of Newton towards Y G = Lam Y: X with M_ii X_ij - X_ij M_jj = M_ij for M = Y G Y^-1, then (I + X) Y."""
+    M = mul(mul(Y, state), _solve(Y, np.eye(len(Y))))
+    X = np.zeros_like(Y)
+    for a, i in enumerate(_places(block)):
+        for b, j in enumerate(_places(block)):
+            if a != b:
+                sylvester = np.kron(M[i, i], np.eye(block[b])) - np.kron(np.eye(block[a]), M[j, j].T)
+                X[i, j] = _solve(sylvester, M[i, j].reshape(-1, 1)).reshape(block[a], block[b])
+    return Y + mul(X, Y)
+
+
+def modal(state: Array, where: str) -> Modal:
+    """Coordinates in which G is block diagonal: a row a real pole, two a pair; all in one block where eigenvectors are missing."""
+    found = _eigenvectors(state)
+    if found is not None:
+        Y, block = digits(found[0], START_DIGITS), found[1]
+        for _ in range(REFINEMENTS):
+            Y = _refined(Y, state, block)
+    else:
+        Y, block = digits(_contracting(state, where), START_DIGITS), (len(state),)
+    return _with_inverse(Y, block, where)
+
+
+def _with_inverse(Y: Array, block: tuple[int, ...], where: str) -> Modal:
+    """|Y^-1| <= |S| (I + |R| + |R|^2 ..) for an approximate inverse S and R = I - Y S."""
+    s = len(Y)
+    S = _solve(Y, np.eye(s))
+    if not (np.all(np.isfinite(Y)) and np.all(np.isfinite(S))):
+        raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
+    R = np.abs(np.eye(s) - mul(Y, S)) + 4 * s * U64 * mul(np.abs(Y), np.abs(S))
+    off = 2 * float(R.max()) * s
+    return Modal(Y, S, np.abs(S) + off * row_sums(np.abs(S))[:, None], off, block)
+
+
+def _norm(block: Array) -> float:
+    """Norm of a block of Lam, as a map of its ball: Euclid's for two rows, that of the largest entry for others."""
+    if len(block) != 2:
+        return float(row_sums(np.abs(block)).max())
+    square, det = float((block**2).sum()), float(block[0, 0] * block[1, 1] - block[0, 1] * block[1, 0])
+    return float(np.sqrt((square + np.sqrt(max(square**2 - 4 * det**2, 0.0))) / 2))
+
+
+def _sizes(columns: Array, block: tuple[int, ...]) -> Array:
+    """Size of the ball of each block that holds each column: blocks x columns."""
+    parts = [columns[p] for p in _places(block)]
+    return np.array([np.sqrt((c**2).sum(0)) if len(c) == 2 else np.abs(c).max(0) for c in parts])
+
+
+def _scaled(found: Modal, lin: hull.Linear, more: Array, radius: Array, where: str) -> Modal:
+    """Rows scaled so that each block's part of the set is of size 1 to 2 at the usual radii; powers of 2 leave every other digit."""
+    Lam = mul(mul(found.transform, lin.state), found.inverse)
+    decay = np.array([min(_norm(Lam[p, p]), 1 - 1e-6) for p in _places(found.block)])
+    each = _sizes(mul(found.transform, np.hstack([lin.input * radius, more])), found.block).sum(1) / (1 - decay)
+    scale = np.array([2.0 ** -np.floor(np.log2(x)) if x > 0.0 else 1.0 for x in each])
+    return _with_inverse(found.transform * np.repeat(scale, found.block)[:, None], found.block, where)
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """Numbers as the ECU holds them, in modal coordinates."""
+
+    Lam: Array  # order x order, zero outside its blocks
+    P: Array  # order x width
+    B: Array  # order x disturbances
+    Q: Array  # residuals x order, made larger by `wider`
+    wider: float
+
+
+def _relative(error: Array, columns: Array) -> Array:
+    """Largest error of each row in parts of its column's magnitude: order."""
+    magnitude = np.abs(columns).sum(0)
+    used = magnitude > 0.0
+    return np.asarray((error[:, used] / magnitude[used]).max(1, initial=0.0))
+
+
+def _growth(lin: hull.Linear, bd: Array, found: Modal, kept: _Stored, terms: int) -> Array:
+    """Share of the set's size by which a step can miss each block: tables, arithmetic of the threshold, arithmetic of the generator."""
+    Y, s, width = found.transform, len(found.transform), lin.input.shape[1]
+    gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    aY, tiny = np.abs(Y), 4 * (s + 1) * U64
+    state = np.abs(mul(Y, lin.state) - mul(kept.Lam, Y)) + tiny * (mul(aY, np.abs(lin.state)) + mul(np.abs(kept.Lam), aY))
+    state = mul(state + gamma * mul(aY, np.abs(lin.state)), found.magnitude).max(1)
+    incoming = np.abs(kept.P - mul(Y, lin.input)) + (tiny + gamma) * mul(aY, np.abs(lin.input))
+    constant = np.abs(kept.B - mul(Y, bd)) + tiny * mul(aY, np.abs(bd))
+    row = state + _relative(incoming, kept.P) + _relative(constant, kept.B) + (s + 4) * U32 * (1 + np.abs(kept.Lam).max())
+    # Norms and sums of `terms` columns lose as many units of what they add up, which is at most |Lam| times the size.
+    sums = 1.1 * terms * U32 * (1 + row_sums(np.abs(kept.Lam)).max())
+    return np.asarray(1.1 * (_sizes(row[:, None], found.block)[:, 0] + sums))
+
+
+def _output_growth(lin: hull.Linear, found: Modal, kept: _Stored) -> Array:
+    """The same for each residual."""
+    s, width = lin.input.shape
+    gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    F = np.abs(lin.output)
+    exact = mul(lin.output, found.inverse) * (1 + kept.wider)
+    off = mul(F, row_sums(np.abs(found.inverse))[:, None]) * 2 * found.off
+    error = np.abs(kept.Q - exact) + off + gamma * mul(F, found.magnitude) + (s + 4) * U32 * np.abs(kept.Q)
+    return np.asarray(1.1 * error.max(1))
+
+
+def _recover(decay: Array, into: Array, constant: Array) -> int:
+    """Samples until what radii as large as a number can be have left in the set is below HEALED."""
+    fastest = np.log(np.maximum(decay, 1e-300))
+    most = np.log(np.maximum(into, 1e-300)) + LARGEST - np.log(1 - decay) + np.log1p(constant)
+    needed = np.ceil((most - np.log(HEALED)) / -fastest).max() + 1
+    return int(min(max(needed, 1.0), NEVER))
+
+
+def build(
+    lin: hull.Linear,
+    T: Array,
+    plant: SubPlant,
+    ranges: hull.Ranges,
+    radius: Array,
+    exact: hull.HullTables,
+    signal: tuple[int, ...],
+    columns: int,
+    reduction: int,
+    where: str,
+    published: bool = False,
+) -> ZonotopeTable:
+    """All tables of one generator. `radius` (width) is what the signals' radii usually are, `exact` the same generator's hull.
+
+    What depends on no data is the hull's bias, exact; only event errors are columns. With `published`, disturbances and the initial set are
+    columns too, and a row of bias is what is there at once.
+    """
+    s, width = lin.input.shape
+    if not 1 <= columns <= 255 or (reduction == BOX and columns < s):
+        raise InputError(f"{where}: a zonotope of {columns} columns; choose {s if reduction == BOX else 1} .. 255")
+    m = plant.C.shape[0]
+    bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd) if published else np.zeros((s, 0))
+    bd = bd[:, np.any(bd != 0.0, axis=0)]
+    found = _scaled(modal(lin.state, where), lin, bd, radius, where)
+    Y, block = found.transform, found.block
+    initial = [nearest32(mul(Y, T * x)) if published else np.zeros((s, 0)) for x in (ranges.initial, ranges.state)]
+    terms = max(columns + width + bd.shape[1], initial[0].shape[1]) + s
+    wider = (terms + width + len(block) + s + 20) * U32 * 1.01
+    Lam = scipy.linalg.block_diag(*[mul(mul(Y[p], lin.state), found.inverse[:, p]) for p in _places(block)])
+    kept = _Stored(nearest32(Lam), nearest32(mul(Y, lin.input)), nearest32(mul(Y, bd)), nearest32(mul(lin.output, found.inverse) * (1 + wider)), wider)
+    decay = up32(np.array([_norm(kept.Lam[p, p]) for p in _places(block)]) * (1 + 4 * U32) + 1e-12)
+    growth = _growth(lin, bd, found, kept, terms)
+    share = float((np.array(block) * growth / np.maximum(1 - decay, 1e-9)).sum())
+    if share > SHARE_MAX:
+        raise InputError(f"{where}: rounding would be {100 * share:.0f} % of its zonotope; choose poles further inside the unit circle and further apart")
+    constant, bias_rest, bias_moving = np.zeros(len(block)), exact.rest, exact.moving
+    if published:
+        constant, bias_rest = _constants(lin, T, plant, ranges, found, wider)
+        bias_moving = bias_rest
+    outer = np.array([np.sqrt((q**2).sum(1)) if q.shape[1] == 2 else row_sums(np.abs(q)) for q in (kept.Q[:, p] for p in _places(block))]).T
+    return ZonotopeTable(
+        signal=signal,
+        columns=columns,
+        reduction=reduction,
+        block=block,
+        state=tuple(float(x) for p in _places(block) for x in kept.Lam[p, p].ravel()),
+        input=rows(kept.P.T),
+        disturbance=rows(kept.B.T),
+        rest=rows(initial[0].T),
+        moving=rows(initial[1].T),
+        output=rows(kept.Q),
+        outer=rows(up32(outer * (1 + wider))),
+        direct=rows(up32(np.abs(lin.direct) * (1 + wider + 2 * (s + width + 2) * U32))),
+        bias_rest=rows(bias_rest),
+        bias_moving=rows(bias_moving),
+        decay=tuple(float(x) for x in decay),
+        always=tuple(float(x) for x in up32(constant + 2 * HEALED)),
+        growth=tuple(float(x) for x in up32(growth)),
+        output_growth=tuple(float(x) for x in up32(_output_growth(lin, found, kept))),
+        recover=_recover(decay, _sizes(kept.P, block).sum(1), constant),
+        ready_rest=exact.ready_rest,
+        ready_moving=exact.ready_moving,
+    )
+
+
+def _constants(lin: hull.Linear, T: Array, plant: SubPlant, ranges: hull.Ranges, found: Modal, wider: float) -> tuple[Array, Array]:
+    """What rounding adds whatever the radii are, into the balls and at once, and the disturbances' way past the state: one row of bias."""
+    m = plant.C.shape[0]
+    Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
+    loss = hull.rounding_of(lin, T, plant, ranges, Bd, hull.LAGS_MAX)
+    into = _sizes(mul(np.abs(found.transform), loss.into_e[:, None]), found.block)[:, 0]
+    Dd = mul(lin.direct[:, :m], plant.Fd)
+    return into, up32((row_sums(np.abs(Dd)) + loss.into_r)[None] * (1 + wider))
