@@ -19,7 +19,9 @@ static bool blocks_valid(const hg_zonotope_config *config)
     uint16_t rows = 0U;
     bool valid = (config->block != NULL) && (config->decay != NULL);
     for (uint8_t b = 0U; valid && (b < config->blocks); b++) {
-        valid = (config->block[b] >= 1U) && (config->decay[b] >= HG_REAL_ZERO) && (config->decay[b] < HG_REAL_C(1.0));
+        const hg_real decay = config->decay[b];
+        valid = (config->block[b] >= 1U) && (decay >= HG_REAL_ZERO) && (decay < HG_REAL_C(1.0));
+        valid = valid && ((config->block[b] == 2U) || (decay <= HG_REAL_ZERO));
         rows += config->block[b];
     }
     return valid && (rows == config->order);
@@ -61,32 +63,23 @@ static hg_real magnitude(const hg_real *column, uint8_t rows)
     return sum;
 }
 
-/* Norm of one block of a column, from above by at most 2 %. Euclid's for two rows: the two tangents of the circle at pi/16 and 3 pi/16,
- * for the larger coordinate first, touch a circle around it; their numbers are rounded up by more than three operations can lose. */
-static hg_real norm_of(const hg_real *entry, uint8_t rows)
+/* Euclid's norm of two entries, from above by at most 2 %: for the larger one first, the tangents of the circle at pi/16 and 3 pi/16 touch
+ * one around it. Their numbers are rounded up by more than three operations can lose. */
+static hg_real euclid(hg_real a, hg_real b)
 {
-    hg_real large = HG_REAL_ZERO;
-    for (uint8_t m = 0U; m < rows; m++) {
-        large = hg_real_max(large, hg_real_abs(entry[m]));
-    }
-    if (rows == 2U) {
-        const hg_real small = hg_real_min(hg_real_abs(entry[0]), hg_real_abs(entry[1]));
-        const hg_real flat = large + hg_real_mul(HG_REAL_C(0.19892), small);
-        const hg_real steep = hg_real_mul(HG_REAL_C(0.84776), large) + hg_real_mul(HG_REAL_C(0.56646), small);
-        large = hg_real_max(flat, steep);
-    }
-    return large;
+    const hg_real large = hg_real_max(hg_real_abs(a), hg_real_abs(b));
+    const hg_real small = hg_real_min(hg_real_abs(a), hg_real_abs(b));
+    const hg_real flat = large + hg_real_mul(HG_REAL_C(0.19892), small);
+    const hg_real steep = hg_real_mul(HG_REAL_C(0.84776), large) + hg_real_mul(HG_REAL_C(0.56646), small);
+    return hg_real_max(flat, steep);
 }
 
 /* Sum of the magnitudes of all that is in the set; what every relative error is a share of. */
 static hg_real size_of(const hg_zonotope *self)
 {
-    hg_real sum = HG_REAL_ZERO;
+    hg_real sum = magnitude(self->spread, self->config->order);
     for (uint16_t i = 0U; i < self->count; i++) {
         sum += magnitude(column_of(self, i), self->config->order);
-    }
-    for (uint8_t b = 0U; b < self->config->blocks; b++) {
-        sum += hg_real_mul((hg_real)self->config->block[b], self->spread[b]);
     }
     return sum;
 }
@@ -96,13 +89,13 @@ static void empty(hg_zonotope *self)
 {
     self->count = 0U;
     self->size = HG_REAL_ZERO;
-    for (uint8_t b = 0U; b < self->config->blocks; b++) {
-        self->spread[b] = HG_REAL_ZERO;
+    for (uint8_t m = 0U; m < self->config->order; m++) {
+        self->spread[m] = HG_REAL_ZERO;
     }
 }
 
 /* Nothing that is not finite may stay. What was in the set moves on unseen by Lam, whose norm bounds it: after `recover` samples it is
- * within always[], which the balls hold by then. */
+ * within always[], which the spread holds by then. */
 static void settle_size(hg_zonotope *self)
 {
     self->size = size_of(self);
@@ -195,13 +188,16 @@ static void box(hg_zonotope *self, uint16_t keep)
     }
 }
 
-/* A column goes into the balls. */
-static void into_balls(hg_zonotope *self, const hg_real *column)
+/* A column goes into the spread. */
+static void enclose(hg_zonotope *self, const hg_real *column)
 {
     const hg_zonotope_config *config = self->config;
     uint16_t row = 0U;
     for (uint8_t b = 0U; b < config->blocks; b++) {
-        self->spread[b] += norm_of(&column[row], config->block[b]);
+        const bool round = config->decay[b] > HG_REAL_ZERO;
+        for (uint8_t m = 0U; m < config->block[b]; m++) {
+            self->spread[row + m] += round ? euclid(column[row], column[row + 1U]) : hg_real_abs(column[row + m]);
+        }
         row += config->block[b];
     }
 }
@@ -220,7 +216,7 @@ static void reduce(hg_zonotope *self)
     } else {
         select_columns(self, config->columns);
         for (uint16_t i = config->columns; (config->reduction == HG_REDUCTION_BALL) && (i < self->count); i++) {
-            into_balls(self, column_of(self, i));
+            enclose(self, column_of(self, i));
         }
     }
     self->count = config->columns;
@@ -239,7 +235,7 @@ hg_status hg_zonotope_start(hg_zonotope *self, const hg_zonotope_config *config,
     self->column = memory;
     self->score = &self->column[(uint32_t)most * config->order];
     self->spread = &self->score[most];
-    self->scratch = &self->spread[config->blocks];
+    self->scratch = &self->spread[config->order];
     hg_zonotope_reset(self, how);
     return HG_OK;
 }
@@ -260,27 +256,97 @@ void hg_zonotope_reset(hg_zonotope *self, hg_start how)
     settle_size(self);
 }
 
+/* One block of Lam, or of its magnitudes, times its part of a column. */
+static void multiply(const hg_zonotope *self, const hg_real *lam, uint8_t rows, bool magnitudes, hg_real *part)
+{
+    for (uint8_t m = 0U; m < rows; m++) {
+        hg_acc sum = hg_acc_zero();
+        for (uint8_t n = 0U; n < rows; n++) {
+            const hg_real factor = lam[((uint16_t)m * rows) + n];
+            sum = hg_acc_mac(sum, magnitudes ? hg_real_abs(factor) : factor, part[n]);
+        }
+        self->scratch[m] = hg_acc_real(sum, 0);
+    }
+    for (uint8_t m = 0U; m < rows; m++) {
+        part[m] = self->scratch[m];
+    }
+}
+
+/* Lam times a column. */
+static void propagate(const hg_zonotope *self, hg_real *column)
+{
+    const hg_zonotope_config *config = self->config;
+    const hg_real *lam = config->state;
+    hg_real *part = column;
+    for (uint8_t b = 0U; b < config->blocks; b++) {
+        multiply(self, lam, config->block[b], false, part);
+        part = &part[config->block[b]];
+        lam = &lam[(uint16_t)config->block[b] * config->block[b]];
+    }
+}
+
+/* The spread one sample on: discs by the norm of their block, boxes by the magnitudes of theirs. */
+static void propagate_spread(hg_zonotope *self)
+{
+    const hg_zonotope_config *config = self->config;
+    const hg_real *lam = config->state;
+    hg_real *part = self->spread;
+    for (uint8_t b = 0U; b < config->blocks; b++) {
+        if (config->decay[b] > HG_REAL_ZERO) {
+            part[0] = hg_real_mul(config->decay[b], part[0]);
+            part[1] = part[0];
+        } else {
+            multiply(self, lam, config->block[b], true, part);
+        }
+        part = &part[config->block[b]];
+        lam = &lam[(uint16_t)config->block[b] * config->block[b]];
+    }
+    for (uint8_t m = 0U; m < config->order; m++) {
+        self->spread[m] += config->always[m];
+    }
+}
+
+/* One more column: `factor` times this one. */
+static hg_real *append(hg_zonotope *self, const hg_real *column, hg_real factor)
+{
+    hg_real *made = column_of(self, self->count);
+    for (uint8_t m = 0U; m < self->config->order; m++) {
+        made[m] = hg_real_mul(column[m], factor);
+    }
+    self->size += magnitude(made, self->config->order);
+    self->count++;
+    return made;
+}
+
+/* What a step, or several, may have missed of magnitudes that sum up to this. */
+static void miss(hg_zonotope *self, hg_real size)
+{
+    for (uint8_t m = 0U; m < self->config->order; m++) {
+        self->spread[m] += hg_real_mul(self->config->growth[m], size);
+    }
+}
+
 void hg_zonotope_widen(hg_zonotope *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *increase)
 {
     const hg_zonotope_config *config = self->config;
+    hg_real size = HG_REAL_ZERO;
     if (lag > self->k) {
         return;
     }
     for (uint8_t g = 0U; g < config->width; g++) {
         const uint8_t place = config->signal[g];
-        if ((place < first) || ((place - first) >= count) || (increase[place - first] <= HG_REAL_ZERO)) {
-            continue;
-        }
-        const hg_real *column = &config->input[(uint16_t)g * config->order];
-        for (uint8_t b = 0U; b < config->blocks; b++) {
-            hg_real more = hg_real_mul(norm_of(column, config->block[b]), increase[place - first]);
+        if ((place >= first) && ((place - first) < count) && (increase[place - first] > HG_REAL_ZERO)) {
+            hg_real *column = append(self, &config->input[(uint16_t)g * config->order], increase[place - first]);
+            size += magnitude(column, config->order);
             for (uint8_t j = 1U; j < lag; j++) {
-                more = hg_real_mul(config->decay[b], more);
+                propagate(self, column);
+                size += magnitude(column, config->order);
             }
-            self->spread[b] += more;
-            column = &column[config->block[b]];
         }
     }
+    /* Earlier errors have shrunk since; that they have not is on the safe side. */
+    miss(self, size);
+    reduce(self);
     settle_size(self);
 }
 
@@ -296,8 +362,8 @@ static void evaluate(const hg_zonotope *self, const hg_real *radius, hg_real *J)
         for (uint8_t g = 0U; g < config->width; g++) {
             sum = hg_acc_mac(sum, config->direct[((uint16_t)i * config->width) + g], radius[config->signal[g]]);
         }
-        for (uint8_t b = 0U; b < config->blocks; b++) {
-            sum = hg_acc_mac(sum, config->outer[((uint16_t)i * config->blocks) + b], self->spread[b]);
+        for (uint8_t m = 0U; m < config->order; m++) {
+            sum = hg_acc_mac(sum, config->outer[((uint16_t)i * config->order) + m], self->spread[m]);
         }
         for (uint16_t c = 0U; c < self->count; c++) {
             const hg_real *column = column_of(self, c);
@@ -315,63 +381,25 @@ static void evaluate(const hg_zonotope *self, const hg_real *radius, hg_real *J)
     }
 }
 
-/* Lam times every column, and the balls by their norms. */
-static void propagate(hg_zonotope *self)
-{
-    const hg_zonotope_config *config = self->config;
-    for (uint16_t i = 0U; i < self->count; i++) {
-        hg_real *part = column_of(self, i);
-        const hg_real *lam = config->state;
-        for (uint8_t b = 0U; b < config->blocks; b++) {
-            const uint8_t rows = config->block[b];
-            for (uint8_t m = 0U; m < rows; m++) {
-                hg_acc sum = hg_acc_zero();
-                for (uint8_t n = 0U; n < rows; n++) {
-                    sum = hg_acc_mac(sum, lam[n], part[n]);
-                }
-                self->scratch[m] = hg_acc_real(sum, 0);
-                lam = &lam[rows];
-            }
-            for (uint8_t m = 0U; m < rows; m++) {
-                part[m] = self->scratch[m];
-            }
-            part = &part[rows];
-        }
-    }
-    for (uint8_t b = 0U; b < config->blocks; b++) {
-        self->spread[b] = hg_real_mul(config->decay[b], self->spread[b]);
-    }
-}
-
-/* One more column: `factor` times this one. */
-static void append(hg_zonotope *self, const hg_real *column, hg_real factor)
-{
-    hg_real *made = column_of(self, self->count);
-    for (uint8_t m = 0U; m < self->config->order; m++) {
-        made[m] = hg_real_mul(column[m], factor);
-    }
-    self->size += magnitude(made, self->config->order);
-    self->count++;
-}
-
 void hg_zonotope_step(hg_zonotope *self, const hg_radii *ring, hg_real *J)
 {
     const hg_zonotope_config *config = self->config;
     const hg_real *radius = newest_radii(ring);
     evaluate(self, radius, J);
-    propagate(self);
+    for (uint16_t i = 0U; i < self->count; i++) {
+        propagate(self, column_of(self, i));
+    }
+    propagate_spread(self);
     for (uint8_t g = 0U; g < config->width; g++) {
         if (radius[config->signal[g]] > HG_REAL_ZERO) {
-            append(self, &config->input[(uint16_t)g * config->order], radius[config->signal[g]]);
+            (void)append(self, &config->input[(uint16_t)g * config->order], radius[config->signal[g]]);
         }
     }
     for (uint8_t d = 0U; d < config->disturbances; d++) {
-        append(self, &config->disturbance[(uint16_t)d * config->order], HG_REAL_C(1.0));
+        (void)append(self, &config->disturbance[(uint16_t)d * config->order], HG_REAL_C(1.0));
     }
     /* size is now that of before and what has come in: all that this sample's errors are a share of. */
-    for (uint8_t b = 0U; b < config->blocks; b++) {
-        self->spread[b] += config->always[b] + hg_real_mul(config->growth[b], self->size);
-    }
+    miss(self, self->size);
     reduce(self);
     if ((self->lost > 0U) && (self->lost < UINT16_MAX)) {
         self->lost--;

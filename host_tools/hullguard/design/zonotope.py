@@ -43,6 +43,7 @@ class Modal:
     magnitude: Array  # order x order
     off: float  # |transform^-1 - inverse| <= off times the row sums of |inverse|
     block: tuple[int, ...]
+    discs: bool  # blocks of two rows are pairs of poles, and bounded by a disc; everything else by an interval a row
 
 
 def _solve(a: Array, b: Array) -> Array:
@@ -90,7 +91,7 @@ def _contracting(state: Array, where: str) -> Array:
     triangle, U = scipy.linalg.schur(state)
     for exponent in range(15):
         scale = 2.0 ** (-exponent * np.arange(len(state)))
-        if _norm(triangle * scale[None, :] / scale[:, None]) < (1 + np.abs(np.linalg.eigvals(state)).max()) / 2:
+        if _norm(triangle * scale[None, :] / scale[:, None], False) < (1 + np.abs(np.linalg.eigvals(state)).max()) / 2:
             break
     else:
         raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
@@ -113,16 +114,15 @@ def _refined(Y: Array, state: Array, block: tuple[int, ...]) -> Array:
 def modal(state: Array, where: str) -> Modal:
     """Coordinates in which G is block diagonal: a row a real pole, two a pair; all in one block where eigenvectors are missing."""
     found = _eigenvectors(state)
-    if found is not None:
-        Y, block = digits(found[0], START_DIGITS), found[1]
-        for _ in range(REFINEMENTS):
-            Y = _refined(Y, state, block)
-    else:
-        Y, block = digits(_contracting(state, where), START_DIGITS), (len(state),)
-    return _with_inverse(Y, block, where)
+    if found is None:
+        return _with_inverse(digits(_contracting(state, where), START_DIGITS), (len(state),), False, where)
+    Y, block = digits(found[0], START_DIGITS), found[1]
+    for _ in range(REFINEMENTS):
+        Y = _refined(Y, state, block)
+    return _with_inverse(Y, block, True, where)
 
 
-def _with_inverse(Y: Array, block: tuple[int, ...], where: str) -> Modal:
+def _with_inverse(Y: Array, block: tuple[int, ...], discs: bool, where: str) -> Modal:
     """|Y^-1| <= |S| (I + |R| + |R|^2 ..) for an approximate inverse S and R = I - Y S."""
     s = len(Y)
     S = _solve(Y, np.eye(s))
@@ -130,30 +130,45 @@ def _with_inverse(Y: Array, block: tuple[int, ...], where: str) -> Modal:
         raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
     R = np.abs(np.eye(s) - mul(Y, S)) + 4 * s * U64 * mul(np.abs(Y), np.abs(S))
     off = 2 * float(R.max()) * s
-    return Modal(Y, S, np.abs(S) + off * row_sums(np.abs(S))[:, None], off, block)
+    return Modal(Y, S, np.abs(S) + off * row_sums(np.abs(S))[:, None], off, block, discs)
 
 
-def _norm(block: Array) -> float:
-    """Norm of a block of Lam, as a map of its ball: Euclid's for two rows, that of the largest entry for others."""
-    if len(block) != 2:
+def _norm(block: Array, disc: bool) -> float:
+    """How much a block of Lam can enlarge a disc (its largest singular value), or the largest entry."""
+    if not disc:
         return float(row_sums(np.abs(block)).max())
     square, det = float((block**2).sum()), float(block[0, 0] * block[1, 1] - block[0, 1] * block[1, 0])
     return float(np.sqrt((square + np.sqrt(max(square**2 - 4 * det**2, 0.0))) / 2))
 
 
-def _sizes(columns: Array, block: tuple[int, ...]) -> Array:
-    """Size of the ball of each block that holds each column: blocks x columns."""
-    parts = [columns[p] for p in _places(block)]
-    return np.array([np.sqrt((c**2).sum(0)) if len(c) == 2 else np.abs(c).max(0) for c in parts])
+def _round(found: Modal) -> list[bool]:
+    """Whether each block has a disc."""
+    return [found.discs and b == 2 for b in found.block]
+
+
+def _norms(Lam: Array, found: Modal) -> Array:
+    """Norm of each block."""
+    return np.array([_norm(Lam[p, p], disc) for p, disc in zip(_places(found.block), _round(found), strict=True)])
+
+
+def _spread(columns: Array, found: Modal) -> Array:
+    """Spread that holds each column: order x columns, a disc's radius twice."""
+    out = np.abs(columns)
+    for p, disc in zip(_places(found.block), _round(found), strict=True):
+        if disc:
+            out[p] = np.sqrt((columns[p] ** 2).sum(0))
+    return out
 
 
 def _scaled(found: Modal, lin: hull.Linear, more: Array, radius: Array, where: str) -> Modal:
-    """Rows scaled so that each block's part of the set is of size 1 to 2 at the usual radii; powers of 2 leave every other digit."""
+    """Rows scaled so that the set reaches about 1 in each at the usual radii; powers of 2 leave every other digit."""
     Lam = mul(mul(found.transform, lin.state), found.inverse)
-    decay = np.array([min(_norm(Lam[p, p]), 1 - 1e-6) for p in _places(found.block)])
-    each = _sizes(mul(found.transform, np.hstack([lin.input * radius, more])), found.block).sum(1) / (1 - decay)
+    keep = 1 - np.minimum(np.repeat(_norms(Lam, found), found.block), 1 - 1e-6)
+    each = _spread(mul(found.transform, np.hstack([lin.input * radius, more])), found).sum(1) / keep
     scale = np.array([2.0 ** -np.floor(np.log2(x)) if x > 0.0 else 1.0 for x in each])
-    return _with_inverse(found.transform * np.repeat(scale, found.block)[:, None], found.block, where)
+    if not found.discs:  # one block: its rows are scaled so that it contracts
+        scale[:] = scale.min()
+    return _with_inverse(found.transform * scale[:, None], found.block, found.discs, where)
 
 
 @dataclass(frozen=True)
@@ -175,7 +190,7 @@ def _relative(error: Array, columns: Array) -> Array:
 
 
 def _growth(lin: hull.Linear, bd: Array, found: Modal, kept: _Stored, terms: int) -> Array:
-    """Share of the set's size by which a step can miss each block: tables, arithmetic of the threshold, arithmetic of the generator."""
+    """Share of the set's size by which a step can miss each row: tables, arithmetic of the threshold, arithmetic of the generator."""
     Y, s, width = found.transform, len(found.transform), lin.input.shape[1]
     gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
     aY, tiny = np.abs(Y), 4 * (s + 1) * U64
@@ -186,7 +201,7 @@ def _growth(lin: hull.Linear, bd: Array, found: Modal, kept: _Stored, terms: int
     row = state + _relative(incoming, kept.P) + _relative(constant, kept.B) + (s + 4) * U32 * (1 + np.abs(kept.Lam).max())
     # Norms and sums of `terms` columns lose as many units of what they add up, which is at most |Lam| times the size.
     sums = 1.1 * terms * U32 * (1 + row_sums(np.abs(kept.Lam)).max())
-    return np.asarray(1.1 * (_sizes(row[:, None], found.block)[:, 0] + sums))
+    return np.asarray(1.1 * (_spread(row[:, None], found)[:, 0] + sums))
 
 
 def _output_growth(lin: hull.Linear, found: Modal, kept: _Stored) -> Array:
@@ -198,6 +213,12 @@ def _output_growth(lin: hull.Linear, found: Modal, kept: _Stored) -> Array:
     off = mul(F, row_sums(np.abs(found.inverse))[:, None]) * 2 * found.off
     error = np.abs(kept.Q - exact) + off + gamma * mul(F, found.magnitude) + (s + 4) * U32 * np.abs(kept.Q)
     return np.asarray(1.1 * error.max(1))
+
+
+def _most(kept: _Stored, found: Modal) -> Array:
+    """Largest entry of its block that radii of 1 can add to a row in one sample."""
+    into = _spread(kept.P, found).sum(1)
+    return np.repeat([into[p].max() for p in _places(found.block)], found.block)
 
 
 def _recover(decay: Array, into: Array, constant: Array) -> int:
@@ -239,16 +260,19 @@ def build(
     wider = (terms + width + len(block) + s + 20) * U32 * 1.01
     Lam = scipy.linalg.block_diag(*[mul(mul(Y[p], lin.state), found.inverse[:, p]) for p in _places(block)])
     kept = _Stored(nearest32(Lam), nearest32(mul(Y, lin.input)), nearest32(mul(Y, bd)), nearest32(mul(lin.output, found.inverse) * (1 + wider)), wider)
-    decay = up32(np.array([_norm(kept.Lam[p, p]) for p in _places(block)]) * (1 + 4 * U32) + 1e-12)
+    norm = up32(_norms(kept.Lam, found) * (1 + 4 * U32) + 1e-12)
     growth = _growth(lin, bd, found, kept, terms)
-    share = float((np.array(block) * growth / np.maximum(1 - decay, 1e-9)).sum())
+    share = float((growth / np.repeat(np.maximum(1 - norm, 1e-9), block)).sum())
     if share > SHARE_MAX:
         raise InputError(f"{where}: rounding would be {100 * share:.0f} % of its zonotope; choose poles further inside the unit circle and further apart")
-    constant, bias_rest, bias_moving = np.zeros(len(block)), exact.rest, exact.moving
+    constant, bias_rest, bias_moving = np.zeros(s), exact.rest, exact.moving
     if published:
         constant, bias_rest = _constants(lin, T, plant, ranges, found, wider)
         bias_moving = bias_rest
-    outer = np.array([np.sqrt((q**2).sum(1)) if q.shape[1] == 2 else row_sums(np.abs(q)) for q in (kept.Q[:, p] for p in _places(block))]).T
+    outer = np.abs(kept.Q)
+    for p, disc in zip(_places(block), _round(found), strict=True):
+        if disc:
+            outer[:, p] = np.sqrt((outer[:, p] ** 2).sum(1))[:, None] * np.array([1.0, 0.0])
     return ZonotopeTable(
         signal=signal,
         columns=columns,
@@ -264,11 +288,11 @@ def build(
         direct=rows(up32(np.abs(lin.direct) * (1 + wider + 2 * (s + width + 2) * U32))),
         bias_rest=rows(bias_rest),
         bias_moving=rows(bias_moving),
-        decay=tuple(float(x) for x in decay),
+        decay=tuple(float(x) if disc else 0.0 for x, disc in zip(norm, _round(found), strict=True)),
         always=tuple(float(x) for x in up32(constant + 2 * HEALED)),
         growth=tuple(float(x) for x in up32(growth)),
         output_growth=tuple(float(x) for x in up32(_output_growth(lin, found, kept))),
-        recover=_recover(decay, _sizes(kept.P, block).sum(1), constant),
+        recover=_recover(np.repeat(norm, block), _most(kept, found), constant),
         ready_rest=exact.ready_rest,
         ready_moving=exact.ready_moving,
     )
@@ -279,6 +303,6 @@ def _constants(lin: hull.Linear, T: Array, plant: SubPlant, ranges: hull.Ranges,
     m = plant.C.shape[0]
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     loss = hull.rounding_of(lin, T, plant, ranges, Bd, hull.LAGS_MAX)
-    into = _sizes(mul(np.abs(found.transform), loss.into_e[:, None]), found.block)[:, 0]
+    into = _spread(mul(np.abs(found.transform), loss.into_e[:, None]), found)[:, 0]
     Dd = mul(lin.direct[:, :m], plant.Fd)
     return into, up32((row_sums(np.abs(Dd)) + loss.into_r)[None] * (1 + wider))

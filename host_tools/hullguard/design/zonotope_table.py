@@ -22,13 +22,13 @@ class ZonotopeTable:
     rest: Rows  # initial x order
     moving: Rows  # initial x order
     output: Rows  # residuals x order
-    outer: Rows  # residuals x blocks
+    outer: Rows  # residuals x order
     direct: Rows  # residuals x width
     bias_rest: Rows  # settle x residuals
     bias_moving: Rows  # settle x residuals
     decay: tuple[float, ...]  # blocks
-    always: tuple[float, ...]  # blocks
-    growth: tuple[float, ...]  # blocks
+    always: tuple[float, ...]  # order
+    growth: tuple[float, ...]  # order
     output_growth: tuple[float, ...]  # residuals
     recover: int
     ready_rest: int
@@ -48,4 +48,4 @@ class ZonotopeTable:
     def reals(self) -> int:
         """HG_ZONOTOPE_REALS: numbers of memory."""
         fresh = len(self.input) + len(self.disturbance)
-        return (self.columns + fresh) * (self.order + 1) + self.order + len(self.block)
+        return (self.columns + fresh) * (self.order + 1) + 2 * self.order
