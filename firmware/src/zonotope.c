@@ -330,7 +330,7 @@ void hg_zonotope_widen(hg_zonotope *self, uint8_t lag, uint8_t first, uint8_t co
 {
     const hg_zonotope_config *config = self->config;
     hg_real size = HG_REAL_ZERO;
-    if (lag > self->k) {
+    if ((lag == 0U) || (lag > self->k)) {
         return;
     }
     for (uint8_t g = 0U; g < config->width; g++) {

@@ -101,7 +101,8 @@ void hg_zonotope_reset(hg_zonotope *self, hg_start how);
 /** A past sample's radii turn out to have been larger: e(k) may be off by the columns Lam^(lag-1) P increase more.
  *  To be called between the push of the newest sample's radii and hg_zonotope_step() for it, once for each (sample, signals) that is
  *  rewritten, in any order and as often as it turns out larger again; reads no ring. It is then as sound as radii that had been as
- *  large from the start. Samples before the start or the last reset belong to the initial set: lag > samples since then is ignored.
+ *  large from the start. Samples before the start or the last reset belong to the initial set: lag > samples since then is ignored, and
+ *  so is lag 0, which the step reads itself.
  *  @param[in] lag       samples before the newest, >= 1
  *  @param[in] first     first signal, a place in the ring's rows   @param[in] count  signals from there
  *  @param[in] increase  [count] new radius - radius used so far; finite. What is negative counts as 0: a set is never made smaller

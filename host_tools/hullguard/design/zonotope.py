@@ -222,7 +222,7 @@ def _most(kept: _Stored, found: Modal) -> Array:
 
 
 def _recover(decay: Array, into: Array, constant: Array) -> int:
-    """Samples until what radii as large as a number can be have left in the set is below HEALED."""
+    """Samples until what radii as large as a number can be have left in the set is below HEALED. `decay` holds for the generator itself."""
     fastest = np.log(np.maximum(decay, 1e-300))
     most = np.log(np.maximum(into, 1e-300)) + LARGEST - np.log(1 - decay) + np.log1p(constant)
     needed = np.ceil((most - np.log(HEALED)) / -fastest).max() + 1
@@ -292,7 +292,7 @@ def build(
         always=tuple(float(x) for x in up32(constant + 2 * HEALED)),
         growth=tuple(float(x) for x in up32(growth)),
         output_growth=tuple(float(x) for x in up32(_output_growth(lin, found, kept))),
-        recover=_recover(np.repeat(norm, block), _most(kept, found), constant),
+        recover=_recover(np.minimum(np.repeat(norm, block) + s * growth.max(), 1 - 1e-6), _most(kept, found), constant),
         ready_rest=exact.ready_rest,
         ready_moving=exact.ready_moving,
     )
