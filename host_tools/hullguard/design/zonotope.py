@@ -11,7 +11,7 @@ magnitudes in the set. Rows are scaled by powers of 2 so that the set is of size
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -29,19 +29,18 @@ START_DIGITS = 6  # of the transform that the solver leaves: few, so that every 
 REFINEMENTS = 3  # each squares the error of the transform
 U64 = 2.0**-53
 HEALED = 1e-6  # of a set of size 1: what an overflow may leave behind when it is forgotten
-SHARE_MAX = 0.1  # what rounding may add to the set
+SHARE_MAX = 0.1  # of the threshold: what rounding may add to it
 LARGEST = np.log(np.finfo(np.float64).max)  # radii of either number type
 NEVER = 65535
 
 
 @dataclass(frozen=True)
 class Modal:
-    """e~ = transform e; transform G inverse is block diagonal, nearly. |transform^-1| <= magnitude, entry by entry."""
+    """e~ = transform e; transform G inverse is block diagonal, nearly."""
 
     transform: Array  # order x order
     inverse: Array  # order x order
-    magnitude: Array  # order x order
-    off: float  # |transform^-1 - inverse| <= off times the row sums of |inverse|
+    miss: Array  # order x order: |transform^-1 - inverse|
     block: tuple[int, ...]
     discs: bool  # blocks of two rows are pairs of poles, and bounded by a disc; everything else by an interval a row
 
@@ -86,16 +85,14 @@ def _eigenvectors(state: Array) -> tuple[Array, tuple[int, ...]] | None:
     return np.array(found), tuple(block)
 
 
-def _contracting(state: Array, where: str) -> Array:
-    """Rows Y in which all of G is one block that shrinks the largest entry: Schur's triangle, scaled until its upper part is small."""
-    triangle, U = scipy.linalg.schur(state)
-    for exponent in range(15):
-        scale = 2.0 ** (-exponent * np.arange(len(state)))
-        if _norm(triangle * scale[None, :] / scale[:, None], False) < (1 + np.abs(np.linalg.eigvals(state)).max()) / 2:
-            break
-    else:
-        raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
-    Y = U.T / scale[:, None]
+def _contracting(state: Array) -> Array | None:
+    """Rows Y in which all of G is one block that shrinks the largest entry: Schur's form M, scaled by x > 0 with |M| x = c (x - 1) < c x."""
+    M, U = scipy.linalg.schur(state)
+    c = (1 + float(np.abs(np.linalg.eigvals(state)).max())) / 2
+    if np.abs(np.linalg.eigvals(np.abs(M))).max() >= c:
+        return None  # pairs that turn fast
+    x = np.linalg.solve(np.eye(len(M)) - np.abs(M) / c, np.ones(len(M)))
+    Y = U.T / x[:, None]
     return np.asarray(Y * np.sign(Y[np.arange(len(Y)), np.argmax(np.round(np.abs(Y), 9), axis=1)])[:, None])
 
 
@@ -111,26 +108,32 @@ def _refined(Y: Array, state: Array, block: tuple[int, ...]) -> Array:
     return Y + mul(X, Y)
 
 
-def modal(state: Array, where: str) -> Modal:
-    """Coordinates in which G is block diagonal: a row a real pole, two a pair; all in one block where eigenvectors are missing."""
+def coordinates(state: Array) -> list[Modal]:
+    """Coordinates to choose from: G block diagonal, a row a real pole and two a pair; and all in one block, for poles that are close or multiple."""
+    made: list[Modal | None] = []
     found = _eigenvectors(state)
-    if found is None:
-        return _with_inverse(digits(_contracting(state, where), START_DIGITS), (len(state),), False, where)
-    Y, block = digits(found[0], START_DIGITS), found[1]
-    for _ in range(REFINEMENTS):
-        Y = _refined(Y, state, block)
-    return _with_inverse(Y, block, True, where)
+    if found is not None:
+        Y, block = digits(found[0], START_DIGITS), found[1]
+        for _ in range(REFINEMENTS):
+            Y = _refined(Y, state, block)
+        made.append(_with_inverse(Y, block, True))
+    together = _contracting(state) if len(state) > 1 else None
+    if together is not None:
+        made.append(_with_inverse(digits(together, START_DIGITS), (len(state),), False))
+    return [m for m in made if m is not None]
 
 
-def _with_inverse(Y: Array, block: tuple[int, ...], discs: bool, where: str) -> Modal:
-    """|Y^-1| <= |S| (I + |R| + |R|^2 ..) for an approximate inverse S and R = I - Y S."""
+def _with_inverse(Y: Array, block: tuple[int, ...], discs: bool) -> Modal | None:
+    """|Y^-1| <= |S| (I + |R| + |R|^2 ..) for an approximate inverse S and R = I - Y S; None where that does not converge soon."""
     s = len(Y)
     S = _solve(Y, np.eye(s))
     if not (np.all(np.isfinite(Y)) and np.all(np.isfinite(S))):
-        raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
+        return None
     R = np.abs(np.eye(s) - mul(Y, S)) + 4 * s * U64 * mul(np.abs(Y), np.abs(S))
     off = 2 * float(R.max()) * s
-    return Modal(Y, S, np.abs(S) + off * row_sums(np.abs(S))[:, None], off, block, discs)
+    if off > 1e-6:
+        return None
+    return Modal(Y, S, off * np.repeat(row_sums(np.abs(S))[:, None], s, axis=1), block, discs)
 
 
 def _norm(block: Array, disc: bool) -> float:
@@ -160,7 +163,7 @@ def _spread(columns: Array, found: Modal) -> Array:
     return out
 
 
-def _scaled(found: Modal, lin: hull.Linear, more: Array, radius: Array, where: str) -> Modal:
+def _scaled(found: Modal, lin: hull.Linear, more: Array, radius: Array) -> Modal:
     """Rows scaled so that the set reaches about 1 in each at the usual radii; powers of 2 leave every other digit."""
     Lam = mul(mul(found.transform, lin.state), found.inverse)
     keep = 1 - np.minimum(np.repeat(_norms(Lam, found), found.block), 1 - 1e-6)
@@ -168,7 +171,8 @@ def _scaled(found: Modal, lin: hull.Linear, more: Array, radius: Array, where: s
     scale = np.array([2.0 ** -np.floor(np.log2(x)) if x > 0.0 else 1.0 for x in each])
     if not found.discs:  # one block: its rows are scaled so that it contracts
         scale[:] = scale.min()
-    return _with_inverse(found.transform * scale[:, None], found.block, found.discs, where)
+    rows_scaled, columns_scaled = scale[:, None], 1 / scale[None, :]
+    return replace(found, transform=found.transform * rows_scaled, inverse=found.inverse * columns_scaled, miss=found.miss * columns_scaled)
 
 
 @dataclass(frozen=True)
@@ -195,7 +199,7 @@ def _growth(lin: hull.Linear, bd: Array, found: Modal, kept: _Stored, terms: int
     gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
     aY, tiny = np.abs(Y), 4 * (s + 1) * U64
     state = np.abs(mul(Y, lin.state) - mul(kept.Lam, Y)) + tiny * (mul(aY, np.abs(lin.state)) + mul(np.abs(kept.Lam), aY))
-    state = mul(state + gamma * mul(aY, np.abs(lin.state)), found.magnitude).max(1)
+    state = mul(state + gamma * mul(aY, np.abs(lin.state)), np.abs(found.inverse) + found.miss).max(1)
     incoming = np.abs(kept.P - mul(Y, lin.input)) + (tiny + gamma) * mul(aY, np.abs(lin.input))
     constant = np.abs(kept.B - mul(Y, bd)) + tiny * mul(aY, np.abs(bd))
     row = state + _relative(incoming, kept.P) + _relative(constant, kept.B) + (s + 4) * U32 * (1 + np.abs(kept.Lam).max())
@@ -210,8 +214,7 @@ def _output_growth(lin: hull.Linear, found: Modal, kept: _Stored) -> Array:
     gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
     F = np.abs(lin.output)
     exact = mul(lin.output, found.inverse) * (1 + kept.wider)
-    off = mul(F, row_sums(np.abs(found.inverse))[:, None]) * 2 * found.off
-    error = np.abs(kept.Q - exact) + off + gamma * mul(F, found.magnitude) + (s + 4) * U32 * np.abs(kept.Q)
+    error = np.abs(kept.Q - exact) + 2 * mul(F, found.miss) + gamma * mul(F, np.abs(found.inverse) + found.miss) + (s + 4) * U32 * np.abs(kept.Q)
     return np.asarray(1.1 * error.max(1))
 
 
@@ -247,33 +250,39 @@ def build(
     What depends on no data is the hull's bias, exact; only event errors are columns. With `published`, disturbances and the initial set are
     columns too, and a row of bias is what is there at once.
     """
-    s, width = lin.input.shape
+    s = len(lin.state)
     if not 1 <= columns <= 255 or (reduction == BOX and columns < s):
         raise InputError(f"{where}: a zonotope of {columns} columns; choose {s if reduction == BOX else 1} .. 255")
-    m = plant.C.shape[0]
-    bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd) if published else np.zeros((s, 0))
-    bd = bd[:, np.any(bd != 0.0, axis=0)]
-    found = _scaled(modal(lin.state, where), lin, bd, radius, where)
-    Y, block = found.transform, found.block
-    initial = [nearest32(mul(Y, T * x)) if published else np.zeros((s, 0)) for x in (ranges.initial, ranges.state)]
-    terms = max(columns + width + bd.shape[1], initial[0].shape[1]) + s
-    wider = (terms + width + len(block) + s + 20) * U32 * 1.01
-    Lam = scipy.linalg.block_diag(*[mul(mul(Y[p], lin.state), found.inverse[:, p]) for p in _places(block)])
-    kept = _Stored(nearest32(Lam), nearest32(mul(Y, lin.input)), nearest32(mul(Y, bd)), nearest32(mul(lin.output, found.inverse) * (1 + wider)), wider)
-    norm = up32(_norms(kept.Lam, found) * (1 + 4 * U32) + 1e-12)
-    growth = _growth(lin, bd, found, kept, terms)
-    share = float((growth / np.repeat(np.maximum(1 - norm, 1e-9), block)).sum())
+    constants = _constants(lin, T, plant, ranges) if published else _Constants(np.zeros((s, 0)), (np.zeros((s, 0)),) * 2, np.zeros(s), np.zeros(0))
+    made = [_table(_scaled(c, lin, constants.every, radius), lin, radius, exact, constants, signal, columns, reduction) for c in coordinates(lin.state)]
+    if not made:
+        raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
+    table, share = min(made, key=lambda x: x[1])
     if share > SHARE_MAX:
-        raise InputError(f"{where}: rounding would be {100 * share:.0f} % of its zonotope; choose poles further inside the unit circle and further apart")
-    constant, bias_rest, bias_moving = np.zeros(s), exact.rest, exact.moving
-    if published:
-        constant, bias_rest = _constants(lin, T, plant, ranges, found, wider)
-        bias_moving = bias_rest
+        raise InputError(f"{where}: rounding would be more than {100 * SHARE_MAX:.0f} % of its zonotope's threshold; choose poles further inside the unit circle and further apart")
+    return table
+
+
+def _table(
+    found: Modal, lin: hull.Linear, radius: Array, exact: hull.HullTables, constants: _Constants, signal: tuple[int, ...], columns: int, reduction: int
+) -> tuple[ZonotopeTable, float]:
+    """The tables in these coordinates, and the largest part of a threshold that rounding would be at the usual radii."""
+    s, width = lin.input.shape
+    Y, block = found.transform, found.block
+    initial = [nearest32(mul(Y, c)) for c in constants.initial]
+    terms = max(columns + width + constants.every.shape[1], initial[0].shape[1]) + s
+    wider = (terms + width + s + 20) * U32 * 1.01
+    Lam = scipy.linalg.block_diag(*[mul(mul(Y[p], lin.state), found.inverse[:, p]) for p in _places(block)])
+    kept = _Stored(nearest32(Lam), nearest32(mul(Y, lin.input)), nearest32(mul(Y, constants.every)), nearest32(mul(lin.output, found.inverse) * (1 + wider)), wider)
+    norm = up32(_norms(kept.Lam, found) * (1 + 4 * U32) + 1e-12)
+    growth, output_growth = _growth(lin, constants.every, found, kept, terms), _output_growth(lin, found, kept)
+    always = _spread(mul(np.abs(Y), constants.into_e[:, None]), found)[:, 0] + 2 * HEALED
     outer = np.abs(kept.Q)
     for p, disc in zip(_places(block), _round(found), strict=True):
         if disc:
             outer[:, p] = np.sqrt((outer[:, p] ** 2).sum(1))[:, None] * np.array([1.0, 0.0])
-    return ZonotopeTable(
+    bias_rest = up32(constants.at_once[None] * (1 + wider)) if len(constants.at_once) else exact.rest
+    table = ZonotopeTable(
         signal=signal,
         columns=columns,
         reduction=reduction,
@@ -287,22 +296,47 @@ def build(
         outer=rows(up32(outer * (1 + wider))),
         direct=rows(up32(np.abs(lin.direct) * (1 + wider + 2 * (s + width + 2) * U32))),
         bias_rest=rows(bias_rest),
-        bias_moving=rows(bias_moving),
+        bias_moving=rows(bias_rest if len(constants.at_once) else exact.moving),
         decay=tuple(float(x) if disc else 0.0 for x, disc in zip(norm, _round(found), strict=True)),
-        always=tuple(float(x) for x in up32(constant + 2 * HEALED)),
+        always=tuple(float(x) for x in up32(always)),
         growth=tuple(float(x) for x in up32(growth)),
-        output_growth=tuple(float(x) for x in up32(_output_growth(lin, found, kept))),
-        recover=_recover(np.minimum(np.repeat(norm, block) + s * growth.max(), 1 - 1e-6), _most(kept, found), constant),
+        output_growth=tuple(float(x) for x in up32(output_growth)),
+        recover=_recover(np.minimum(np.repeat(norm, block) + s * growth.max(), 1 - 1e-6), _most(kept, found), always),
         ready_rest=exact.ready_rest,
         ready_moving=exact.ready_moving,
     )
+    return table, _share(table, norm, radius, exact.steady)
 
 
-def _constants(lin: hull.Linear, T: Array, plant: SubPlant, ranges: hull.Ranges, found: Modal, wider: float) -> tuple[Array, Array]:
-    """What rounding adds whatever the radii are, into the balls and at once, and the disturbances' way past the state: one row of bias."""
+def _share(table: ZonotopeTable, norm: Array, radius: Array, steady: Array) -> float:
+    """What the shares of the set's size and the constants add to a threshold, in parts of it; the set at its largest, at the usual radii."""
+    keep = np.repeat(1 - norm, table.block)
+    if np.any(keep <= 0.0):
+        return np.inf
+    columns = np.hstack([np.array(table.input).T * radius, np.array(table.disturbance).reshape(-1, table.order).T])
+    size = float((np.abs(columns).sum(1) / keep).sum())
+    growth = np.array(table.growth)
+    if float((growth / keep).sum()) > SHARE_MAX:
+        return np.inf  # it would feed on itself
+    spread = (np.array(table.always) + growth * size) / keep
+    added = np.array(table.output_growth) * size + row_sums(np.array(table.outer) * spread)
+    return float((added / np.maximum(steady, 1e-300)).max())
+
+
+@dataclass(frozen=True)
+class _Constants:
+    """What depends on no data but is in the set, as published."""
+
+    every: Array  # order x disturbances
+    initial: tuple[Array, Array]  # order x states, at rest and moving
+    into_e: Array  # order: rounding of a step
+    at_once: Array  # residuals; empty where it is not in the set but in the hull's bias
+
+
+def _constants(lin: hull.Linear, T: Array, plant: SubPlant, ranges: hull.Ranges) -> _Constants:
+    """Disturbances, the initial set and constant rounding."""
     m = plant.C.shape[0]
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
-    loss = hull.rounding_of(lin, T, plant, ranges, Bd, hull.LAGS_MAX)
-    into = _spread(mul(np.abs(found.transform), loss.into_e[:, None]), found)[:, 0]
     Dd = mul(lin.direct[:, :m], plant.Fd)
-    return into, up32((row_sums(np.abs(Dd)) + loss.into_r)[None] * (1 + wider))
+    loss = hull.rounding_of(lin, T, plant, ranges, Bd, hull.LAGS_MAX)
+    return _Constants(Bd[:, np.any(Bd != 0.0, axis=0)], (T * ranges.initial, T * ranges.state), loss.into_e, row_sums(np.abs(Dd)) + loss.into_r)
