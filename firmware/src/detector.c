@@ -2,12 +2,18 @@
 
 #include <stddef.h>
 
+#define WIDER HG_REAL_C(1.000001) /* more than the rounding of a difference can take away */
+
 uint32_t hg_detector_reals(const hg_detector_config *config)
 {
     uint32_t reals = (3U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals);
     reals += HG_RING_REALS(config->width, config->history) + HG_RING_REALS(config->signals, config->window);
     for (uint8_t g = 0U; g < config->generators; g++) {
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
+    }
+    for (uint8_t g = 0U; (config->zonotope != NULL) && (g < config->generators); g++) {
+        const hg_zonotope_config *zonotope = &config->zonotope[g];
+        reals += HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances);
     }
     for (uint8_t i = 0U; i < config->predictors; i++) {
         reals += HG_PREDICT_REALS(config->predict[i].order, config->predict[i].inputs, config->predict[i].width);
@@ -30,7 +36,7 @@ static bool sizes_valid(const hg_detector_config *config)
     bool valid = (config->signals >= 1U) && (config->width >= config->signals) && (config->history >= 1U) && (config->groups >= 1U) &&
                  (config->groups <= HG_GROUPS_MAX) && (config->predictors <= HG_GROUPS_MAX) && (config->hold != NULL);
     valid = valid && (judged >= 1U) && (judged <= HG_GENERATORS_MAX) && (judged == config->decision.generators);
-    valid = valid && ((config->generators == 0U) || ((config->residual != NULL) && (config->hull != NULL)));
+    valid = valid && ((config->generators == 0U) || ((config->residual != NULL) && ((config->hull != NULL) != (config->zonotope != NULL))));
     valid = valid && ((config->banks == 0U) || ((config->bank != NULL) && (config->window >= 1U)));
     return valid && ((config->predictors == 0U) || (config->predict != NULL));
 }
@@ -38,7 +44,8 @@ static bool sizes_valid(const hg_detector_config *config)
 static bool memory_there(const hg_detector_config *config, const hg_detector_memory *memory)
 {
     bool there = (memory->hold != NULL) && (memory->alarm != NULL) && (memory->code != NULL) && (memory->real != NULL);
-    there = there && ((config->generators == 0U) || ((memory->residual != NULL) && (memory->hull != NULL)));
+    there = there && ((config->generators == 0U) || ((memory->residual != NULL) &&
+                      (((config->hull != NULL) ? (const void *)memory->hull : (const void *)memory->zonotope) != NULL)));
     there = there && ((config->banks == 0U) || ((memory->bank != NULL) && (memory->sum != NULL)));
     return there && ((config->predictors == 0U) || (memory->predict != NULL));
 }
@@ -65,21 +72,38 @@ static bool derived_valid(const hg_detector_config *config)
     return valid && (width == config->width);
 }
 
+/* A rewind must end inside the ring, and inside the taps: what a tail has taken in cannot be corrected. */
+static bool rewinds_end(const hg_detector_config *config, uint8_t inside)
+{
+    bool valid = true;
+    for (uint8_t i = 0U; i < config->groups; i++) {
+        valid = valid && (config->hold[i].trigger->interval_max <= inside);
+    }
+    return valid;
+}
+
+static bool generator_valid(const hg_detector_config *config, uint8_t g)
+{
+    const hg_residual_config *residual = &config->residual[g];
+    bool valid = (residual->signal != NULL) && (residual->residuals >= 1U);
+    if (config->hull != NULL) {
+        valid = valid && (residual->residuals == config->hull[g].residuals) && rewinds_end(config, config->hull[g].taps);
+    } else {
+        valid = valid && (residual->residuals == config->zonotope[g].residuals);
+    }
+    for (uint8_t i = 0U; valid && (i < residual->width); i++) {
+        valid = residual->signal[i] < config->width;
+    }
+    return valid;
+}
+
 static bool generators_valid(const hg_detector_config *config)
 {
     uint32_t residuals = config->banks;
-    bool valid = true;
-    for (uint8_t g = 0U; g < config->generators; g++) {
-        valid = valid && (config->residual[g].residuals == config->hull[g].residuals);
+    bool valid = rewinds_end(config, (uint8_t)(config->history - 1U));
+    for (uint8_t g = 0U; valid && (g < config->generators); g++) {
+        valid = generator_valid(config, g);
         residuals += config->residual[g].residuals;
-        /* A rewind must end inside the taps: what the tail has taken in cannot be corrected. */
-        for (uint8_t i = 0U; i < config->groups; i++) {
-            valid = valid && (config->hull[g].taps >= config->hold[i].trigger->interval_max);
-        }
-        valid = valid && (config->residual[g].signal != NULL);
-        for (uint8_t i = 0U; valid && (i < config->residual[g].width); i++) {
-            valid = config->residual[g].signal[i] < config->width;
-        }
     }
     for (uint8_t b = 0U; valid && (b < config->banks); b++) {
         valid = (config->bank[b].window <= config->history) && hg_bank_valid(&config->bank[b], config->signals, config->width, config->window);
@@ -111,10 +135,16 @@ static hg_status start_generators(hg_detector *self, hg_start how)
     memory = &memory[HG_RING_REALS(config->width, config->history)];
     for (uint8_t g = 0U; (status == HG_OK) && (g < config->generators); g++) {
         status = hg_residual_start(&self->memory.residual[g], &config->residual[g], memory);
-        if (status == HG_OK) {
-            status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how);
-        }
         memory = &memory[HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width)];
+        if ((status == HG_OK) && (config->hull != NULL)) {
+            status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how);
+        } else if (status == HG_OK) {
+            const hg_zonotope_config *zonotope = &config->zonotope[g];
+            status = hg_zonotope_start(&self->memory.zonotope[g], zonotope, &self->radii, how, memory);
+            memory = &memory[HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances)];
+        } else {
+            /* refused */
+        }
     }
     for (uint8_t i = 0U; (status == HG_OK) && (i < config->predictors); i++) {
         const hg_predict_config *predict = &config->predict[i];
@@ -168,19 +198,33 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     return (status == HG_OK) ? hg_decision_start(&self->decision, &config->decision, memory->alarm) : status;
 }
 
+static void reset_threshold(hg_detector *self, uint8_t g, hg_start how)
+{
+    if (self->config->hull != NULL) {
+        hg_hull_reset(&self->memory.hull[g], how);
+    } else {
+        hg_zonotope_reset(&self->memory.zonotope[g], how);
+    }
+}
+
+static void reset_banks(hg_detector *self)
+{
+    for (uint8_t b = 0U; b < self->config->banks; b++) {
+        hg_bank_reset(&self->memory.bank[b]);
+    }
+}
+
 void hg_detector_restart(hg_detector *self, hg_start how)
 {
     hg_ring_reset(&self->radii);
     for (uint8_t i = 0U; i < self->config->predictors; i++) {
         hg_predict_reset(&self->memory.predict[i]);
     }
-    for (uint8_t b = 0U; b < self->config->banks; b++) {
-        hg_bank_reset(&self->memory.bank[b]);
-    }
     for (uint8_t g = 0U; g < self->config->generators; g++) {
         hg_residual_reset(&self->memory.residual[g]);
-        hg_hull_reset(&self->memory.hull[g], how);
+        reset_threshold(self, g, how);
     }
+    reset_banks(self);
     hg_decision_reset(&self->decision);
 }
 
@@ -249,29 +293,33 @@ static void derive(hg_detector *self, uint8_t doubt)
 static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t lag)
 {
     const hg_detector_config *config = self->config;
-    const uint8_t width = config->hold[group].trigger->width;
     hg_real *row = hg_ring_row(&self->radii, lag);
+    hg_real *increase = self->past;
     uint8_t place = config->signals;
-    for (uint8_t g = 0U; g < config->signals; g++) {
-        self->past[g] = row[g];
+    for (uint8_t g = 0U; g < config->width; g++) {
+        increase[g] = row[g];
     }
-    hg_hold_past(&self->memory.hold[group], lag, &self->past[first]);
+    hg_hold_past(&self->memory.hold[group], lag, &row[first]);
     for (uint8_t i = 0U; i < config->predictors; i++) {
         const hg_predict_config *predict = &config->predict[i];
         /* Where the prediction was the tighter one it still is; the held one's wider radius holds for either. */
-        for (uint8_t g = 0U; (predict->group == group) && (g < width); g++) {
-            row[place + g] = hg_real_max(row[place + g], self->past[first + g]);
+        for (uint8_t g = 0U; (predict->group == group) && (g < predict->width); g++) {
+            row[place + g] = hg_real_max(row[place + g], row[first + g]);
         }
         place += predict->width;
     }
-    if (config->mismatch != NULL) {
-        for (uint8_t g = 0U; g < config->signals; g++) {
-            self->past[g] = self->past[g] - row[g];
-        }
-        hg_mismatch_grow(config->mismatch, self->past, &row[place]);
-        hg_hold_past(&self->memory.hold[group], lag, &self->past[first]);
+    for (uint8_t g = 0U; g < place; g++) {
+        increase[g] = hg_real_mul(row[g] - increase[g], WIDER);
     }
-    hg_ring_rewrite(&self->radii, lag, first, width, &self->past[first]);
+    if (config->mismatch != NULL) {
+        hg_mismatch_grow(config->mismatch, increase, &row[place]);
+        for (uint8_t g = place; g < config->width; g++) {
+            increase[g] = hg_real_mul(row[g] - increase[g], WIDER);
+        }
+    }
+    for (uint8_t g = 0U; (config->zonotope != NULL) && (g < config->generators); g++) {
+        hg_zonotope_widen(&self->memory.zonotope[g], lag, 0U, config->width, increase);
+    }
 }
 
 /* Close the sample in every hold; radii of the past are corrected where a loss has just shown. */
@@ -309,6 +357,17 @@ static void refuse(hg_detector *self)
     self->refusals += (self->refusals < UINT32_MAX) ? 1U : 0U;
 }
 
+/* Threshold of one generator; has it settled since its start? */
+static bool step_threshold(hg_detector *self, uint8_t g, hg_real *J)
+{
+    if (self->config->hull != NULL) {
+        hg_hull_step(&self->memory.hull[g], &self->radii, J);
+        return hg_hull_ready(&self->memory.hull[g]);
+    }
+    hg_zonotope_step(&self->memory.zonotope[g], &self->radii, J);
+    return hg_zonotope_ready(&self->memory.zonotope[g]);
+}
+
 /* Residuals and thresholds of the generators. */
 static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
 {
@@ -317,13 +376,13 @@ static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
     hg_real *J = self->J;
     for (uint8_t g = 0U; g < self->config->generators; g++) {
         const uint8_t n = self->config->residual[g].residuals;
-        hg_hull *hull = &self->memory.hull[g];
         const hg_status moved = hg_residual_step(&self->memory.residual[g], self->value, r);
-        hg_hull_step(hull, &self->radii, J);
+        bool ready = step_threshold(self, g, J);
         if (moved != HG_OK) {
             /* A sample is missing from z for good: only a start anywhere in the range is still true of it. */
             hg_residual_reset(&self->memory.residual[g]);
-            hg_hull_reset(hull, HG_START_MOVING);
+            reset_threshold(self, g, HG_START_MOVING);
+            ready = false;
             refuse(self);
             status = moved;
         } else if (hg_decision_exceeds(r, J, n)) {
@@ -331,7 +390,7 @@ static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
         } else {
             /* within its threshold */
         }
-        evidence->ready = evidence->ready && hg_hull_ready(hull);
+        evidence->ready = evidence->ready && ready;
         r = &r[n];
         J = &J[n];
     }

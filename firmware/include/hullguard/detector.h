@@ -20,6 +20,7 @@
 #include "hullguard/residual.h"
 #include "hullguard/ring.h"
 #include "hullguard/status.h"
+#include "hullguard/zonotope.h"
 
 typedef struct {                /* flash: one a model, generated */
     uint8_t                   signals;    /* sent ones, 1 .. 255 */
@@ -31,11 +32,12 @@ typedef struct {                /* flash: one a model, generated */
     const hg_mismatch_config *mismatch;   /* of an uncertain plant, or null */
     uint8_t                   generators; /* 0 .. HG_GENERATORS_MAX */
     const hg_residual_config *residual;   /* [generators] */
-    const hg_hull_config     *hull;       /* [generators] */
+    const hg_hull_config     *hull;       /* [generators] thresholds by the exact hull, or null: then by */
+    const hg_zonotope_config *zonotope;   /* [generators] zonotopes */
     uint8_t                   banks;      /* generators + banks: 1 .. HG_GENERATORS_MAX */
     const hg_bank_config     *bank;       /* [banks] */
     hg_decision_config        decision;   /* of generators and banks, generators first */
-    uint8_t                   history;    /* rows of the ring of radii, 1 .. 255: more than the taps of any hull, as many as any bank's window */
+    uint8_t                   history;    /* rows of the ring of radii, 1 .. 255: more than interval_max of any group and the taps of any hull, as many as any bank's window */
     uint8_t                   window;     /* rows of the ring of values: the longest window of a bank; 0 without one */
     uint16_t                  residuals;  /* of all generators together, and one for each bank */
     uint16_t                  codes;      /* numbers of integer memory: 2 signals */
@@ -48,6 +50,7 @@ typedef struct {                /* where a detector keeps what it knows; owned b
     hg_predict *predict;        /* [predictors], null without one */
     hg_residual *residual;      /* [generators], null without one */
     hg_hull  *hull;             /* [generators], null without one */
+    hg_zonotope *zonotope;      /* [generators], null without one */
     hg_bank  *bank;             /* [banks], null without one */
     hg_alarm *alarm;            /* [generators + banks] */
     int32_t  *code;             /* [codes] */

@@ -13,6 +13,7 @@
 #include "hullguard/residual.h"
 #include "hullguard/ring.h"
 #include "hullguard/hull.h"
+#include "hullguard/zonotope.h"
 #include "hullguard/bank.h"
 #include "hullguard/predict.h"
 #include "hullguard/mismatch.h"

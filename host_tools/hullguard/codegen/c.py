@@ -15,6 +15,7 @@ from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.bank_table import BankTable
 from hullguard.design.design import Design
 from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, SignalTable, Tables
+from hullguard.design.zonotope_table import BALL, BOX, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 
 WIDTH = 140  # columns
@@ -137,10 +138,16 @@ def _limits(tables: Tables) -> list[str]:
     return [*lines, ""] if lines else []
 
 
+def zonotopes(tables: Tables) -> list[ZonotopeTable]:
+    """The zonotopes that are the thresholds instead of hulls; of all generators, or of none."""
+    return [g.zonotope for g in tables.generators if g.zonotope is not None]
+
+
 def _storage(tables: Tables) -> list[str]:
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
     codes, closing = max(2 * tables.signals, 1), max(len(tables.groups[tables.closing].signals), 1)
-    own = [("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), ("hg_hull", "hull", len(tables.generators))]
+    threshold = "zonotope" if zonotopes(tables) else "hull"
+    own = [("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), (f"hg_{threshold}", threshold, len(tables.generators))]
     own += [("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums)]
     return [
         "/* Memory of one detector node. */",
@@ -340,12 +347,49 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
         lines += table("hg_real", f"{n}_{part}", f"{order}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
     for part, cols, about in (("output", order, "residual from state"), ("direct", width, "residual from signals")):
         lines += table("hg_real", f"{n}_{part}", f"{residuals}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
-    lines += _taps(g, n)
+    return lines + (_hull(g, n) if g.zonotope is None else _zonotope(g.zonotope, n, signals))
+
+
+def _hull(g: GeneratorTable, n: str) -> list[str]:
+    residuals = len(g.output)
+    lines = _taps(g, n)
     for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
         rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {start}"
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
     lines += table("hg_real", f"{n}_tail_input", f"{len(g.wide)}", [reals(g.tail_input)], "weight of a radius older than the taps")
-    lines += table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")
+    return lines + table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")
+
+
+REDUCTIONS = {TRUNCATE: "HG_REDUCTION_TRUNCATE", BOX: "HG_REDUCTION_BOX", BALL: "HG_REDUCTION_BALL"}
+ZONOTOPE_ROWS = (
+    ("input", "[width][order]", "columns of the signals, in modal coordinates"),
+    ("disturbance", "[disturbances][order]", "columns of the disturbances"),
+    ("rest", "[initial][order]", "the set after a start within the initial range"),
+    ("moving", "[initial][order]", "the set after a start in a moving plant"),
+    ("output", "[residuals][order]", "residual units a unit of the set"),
+    ("outer", "[residuals][order]", "residual units a unit of the spread"),
+    ("direct", "[residuals][width]", "residual units a signal unit, at once"),
+    ("bias_rest", "[settle][residuals]", "what depends on no data, by sample after a start within the initial range"),
+    ("bias_moving", "[settle][residuals]", "what depends on no data, by sample after a start in a moving plant"),
+)
+ZONOTOPE_VECTORS = (
+    ("state", "blocks", "Lam, its blocks one after another, row-major"),
+    ("decay", "blocks", "norm of a block of two rows"),
+    ("always", "order", "into the spread every sample"),
+    ("growth", "order", "share of the set's size into the spread every sample"),
+    ("output_growth", "residuals", "share of the set's size in the threshold"),
+)
+
+
+def _zonotope(z: ZonotopeTable, n: str, signals: Sequence[str]) -> list[str]:
+    about = "places of the radii that its threshold reads: " + ", ".join(signals[i] for i in z.signal)
+    lines = table("uint8_t", f"{n}_wide", f"{len(z.signal)}", [unsigned(z.signal)], about)
+    lines += table("uint8_t", f"{n}_block", f"{len(z.block)}", [unsigned(z.block)], "rows of each block of Lam")
+    for part, shape, what in ZONOTOPE_VECTORS:
+        lines += table("hg_real", f"{n}_{part if part != 'state' else 'lam'}", shape, [reals(getattr(z, part))], what)
+    for part, shape, what in ZONOTOPE_ROWS:
+        rows = [reals(r) for r in getattr(z, part)]
+        lines += table("hg_real", f"{n}_z_{part}", shape[1:-1], rows, what)
     return lines
 
 
@@ -446,13 +490,33 @@ def _generators(tables: Tables) -> list[str]:
             f"     .output = {{.rows = {residuals}U, .cols = {order}U, .exponent = 0, .data = {n}_output}},",
             f"     .direct = {{.rows = {residuals}U, .cols = {width}U, .exponent = 0, .data = {n}_direct}}}},",
         ]
-    lines += ["};", "", *comment(f"hull [{count}]: their thresholds"), "static const hg_hull_config hull[] = {"]
+    lines += ["};", ""]
+    if zonotopes(tables):
+        return [*lines, *_zonotopes(tables)]
+    lines += [*comment(f"hull [{count}]: their thresholds"), "static const hg_hull_config hull[] = {"]
     for i, g in enumerate(tables.generators):
         n = f"generator{i + 1}"
         lines += [
             f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'}, .taps = {g.taps}U, .weight = {n}_weight,",
             f"     .settle = {g.settle}U, .rest = {n}_rest, .moving = {n}_moving, .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U,",
             f"     .decay = {real(g.decay)}, .tail_input = {n}_tail_input, .tail_output = {n}_tail_output}},",
+        ]
+    return [*lines, "};", ""]
+
+
+def _zonotopes(tables: Tables) -> list[str]:
+    lines = [*comment(f"zonotope [{len(tables.generators)}]: their thresholds"), "static const hg_zonotope_config zonotope[] = {"]
+    for i, z in enumerate(zonotopes(tables)):
+        n = f"generator{i + 1}"
+        tied = {part: present(f"{n}_z_{part}", getattr(z, part)) for part, _, _ in ZONOTOPE_ROWS}
+        lines += [
+            f"    {{.order = {z.order}U, .residuals = {len(z.output)}U, .width = {len(z.signal)}U, .disturbances = {len(z.disturbance)}U,",
+            f"     .initial = {len(z.rest)}U, .columns = {z.columns}U, .blocks = {len(z.block)}U, .reduction = {REDUCTIONS[z.reduction]},",
+            f"     .signal = {n}_wide, .block = {n}_block, .state = {n}_lam, .input = {tied['input']}, .disturbance = {tied['disturbance']},",
+            f"     .rest = {tied['rest']}, .moving = {tied['moving']}, .output = {tied['output']}, .outer = {tied['outer']},",
+            f"     .direct = {tied['direct']}, .settle = {z.settle}U, .bias_rest = {tied['bias_rest']}, .bias_moving = {tied['bias_moving']},",
+            f"     .decay = {n}_decay, .always = {n}_always, .growth = {n}_growth, .output_growth = {n}_output_growth,",
+            f"     .recover = {z.recover}U, .ready_rest = {z.ready_rest}U, .ready_moving = {z.ready_moving}U}},",
         ]
     return [*lines, "};", ""]
 
@@ -468,13 +532,15 @@ def _node(design: Design) -> list[str]:
     tables = design.tables
     t, prefix, count = f"hg_{tables.name}", f"HG_{tables.name.upper()}", len(tables.generators)
     predict, mismatch = present("predict", tables.predictors), "&mismatch" if tables.mismatch else "NULL"
-    own, bank = (("residual", "hull") if count else ("NULL", "NULL")), present("bank", tables.banks)
+    own, bank = present("residual", tables.generators), present("bank", tables.banks)
+    thresholds = ("NULL", "zonotope") if zonotopes(tables) else (present("hull", tables.generators), "NULL")
     lines = [
         "/* detector: the whole of it */",
         "static const hg_detector_config detector = {",
         f"    .signals = {prefix}_SIGNALS, .width = {tables.width}U, .groups = {prefix}_GROUPS, .hold = hold,",
         f"    .predictors = {len(tables.predictors)}U, .predict = {predict}, .mismatch = {mismatch},",
-        f"    .generators = {count}U, .residual = {own[0]}, .hull = {own[1]}, .banks = {len(tables.banks)}U, .bank = {bank},",
+        f"    .generators = {count}U, .residual = {own}, .hull = {thresholds[0]}, .zonotope = {thresholds[1]},",
+        f"    .banks = {len(tables.banks)}U, .bank = {bank},",
         f"    .decision = {{.generators = {tables.judged}U, .feeds = feeds, .faults = moved_by,",
         f"                 .up = {tables.up}U, .down = {tables.down}U, .latch = {boolean(tables.latch)}}},",
         f"    .history = {tables.history}U, .window = {tables.window}U, .residuals = {tables.residuals}U,",
@@ -505,7 +571,8 @@ def _starts(tables: Tables) -> list[str]:
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
     first = ", ".join(f"{2 * g.first}U" for g in tables.groups)
     generators, banks = tables.generators, tables.banks
-    parts = (("predict", tables.predictors), ("residual", generators), ("hull", generators), ("bank", banks), ("sum", banks))
+    balls = zonotopes(tables)
+    parts = (("predict", tables.predictors), ("residual", generators), ("hull", [] if balls else generators), ("zonotope", balls), ("bank", banks), ("sum", banks))
     own = [f"self->{name}" if there else "NULL" for name, there in parts]
     return [
         f"hg_status {t}_node_start({t}_node *self, hg_start how)",
@@ -514,9 +581,9 @@ def _starts(tables: Tables) -> list[str]:
         "        return HG_E_ARGUMENT;",
         "    }",
         "    const hg_node_memory memory = {",
-        f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .bank = {own[3]},",
+        f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},",
         f"                     .alarm = self->alarm, .code = self->code, .codes = {2 * tables.signals}U, .real = self->real, .reals = {tables.reals}UL,",
-        f"                     .sum = {own[4]}, .sums = {tables.sums}UL}},",
+        f"                     .sum = {own[5]}, .sums = {tables.sums}UL}},",
         "        .link = self->link,",
         "        .closing = self->closing,",
         "    };",

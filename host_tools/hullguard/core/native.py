@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.core.library import Library
+from hullguard.core.zonotope import fill
 from hullguard.design.design import Design
 from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, Tables
 from hullguard.errors import InputError
@@ -109,11 +110,20 @@ class Native:
         t = self.tables
         count = len(t.generators)
         residuals, hulls = self._new("hg_residual_config[]", count or 1), self._new("hg_hull_config[]", count or 1)
+        zonotopes = self._new("hg_zonotope_config[]", count or 1)
         for i, g in enumerate(t.generators):
-            self._generator(residuals[i], hulls[i], g)
+            self._generator(residuals[i], g)
+            if g.zonotope is None:
+                self._hull(hulls[i], g)
+            else:
+                self._keep += fill(self.library.ffi, zonotopes[i], g.zonotope)
         d = self._new("hg_detector_config *")
         d.signals, d.width, d.groups, d.hold = t.signals, t.width, len(t.groups), holds
-        d.generators, d.residual, d.hull = count, residuals, hulls
+        d.generators, d.residual = count, residuals
+        if any(g.zonotope is not None for g in t.generators):
+            d.zonotope = zonotopes
+        else:
+            d.hull = hulls
         self._derived(d)
         self._banks(d)
         d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = t.judged, t.up, t.down, t.latch
@@ -149,12 +159,13 @@ class Native:
             b.extra_weight = self._reals(table.extra_weight)
         d.banks, d.bank = len(t.banks), banks
 
-    def _generator(self, r: Any, h: Any, g: GeneratorTable) -> None:
-        signal, wide = self._ints("uint8_t", g.signal), self._ints("uint8_t", g.wide)
-        r.order, r.residuals, r.width, r.signal = len(g.state), len(g.output), len(g.signal), signal
+    def _generator(self, r: Any, g: GeneratorTable) -> None:
+        r.order, r.residuals, r.width, r.signal = len(g.state), len(g.output), len(g.signal), self._ints("uint8_t", g.signal)
         for place, table in ((r.state, g.state), (r.input, g.input), (r.output, g.output), (r.direct, g.direct)):
             self._matrix(place, table)
-        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), wide, g.taps
+
+    def _hull(self, h: Any, g: GeneratorTable) -> None:
+        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), self._ints("uint8_t", g.wide), g.taps
         h.weight, h.settle, h.rest, h.moving = self._reals(g.weight), g.settle, self._reals(g.rest), self._reals(g.moving)
         h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, g.decay
         h.tail_input, h.tail_output = self._reals(g.tail_input), self._reals(g.tail_output)
@@ -213,6 +224,7 @@ class Node:
         own = memory.detector
         own.hold, own.predict, own.alarm = room("hg_hold", groups), room("hg_predict", len(t.predictors)), room("hg_alarm", t.judged)
         own.residual, own.hull, own.bank = room("hg_residual", len(t.generators)), room("hg_hull", len(t.generators)), room("hg_bank", len(t.banks))
+        own.zonotope = room("hg_zonotope", len(t.generators))
         own.code, own.codes, own.real, own.reals = room("int32_t", 2 * t.signals), d.codes, room("hg_real", d.reals), d.reals
         own.sum, own.sums = room("hg_acc", d.sums), d.sums
         memory.link, memory.closing = room("hg_link", groups), room("int32_t", len(t.groups[t.closing].signals) + 1)

@@ -45,6 +45,7 @@ static hg_node_memory node_memory(arena *a, const hg_node_config *node)
     m.detector.predict = take(a, d->predictors, sizeof(hg_predict));
     m.detector.residual = take(a, d->generators, sizeof(hg_residual));
     m.detector.hull = take(a, d->generators, sizeof(hg_hull));
+    m.detector.zonotope = take(a, d->generators, sizeof(hg_zonotope));
     m.detector.bank = take(a, d->banks, sizeof(hg_bank));
     m.detector.alarm = take(a, (size_t)d->generators + d->banks, sizeof(hg_alarm));
     m.detector.codes = (uint16_t)(2U * d->signals);

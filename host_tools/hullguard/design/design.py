@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from hullguard.bus.bits import load_bound
-from hullguard.design import hull, store
+from hullguard.design import hull, store, zonotope
 from hullguard.design.arith import digits, mul
 from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
@@ -19,6 +19,7 @@ from hullguard.design.reach import reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
+from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.plant import Feedback
 from hullguard.model.schema import Model, Observer
@@ -38,6 +39,7 @@ class Generator:
     filter: PostFilter
     linear: hull.Linear
     tables: hull.HullTables
+    zonotope: ZonotopeTable | None  # the threshold instead of the hull
     signal: tuple[int, ...]  # places of its signals
     radius: Array  # usual radii of its signals, then of the uncertain states
     smallest: Array  # faults of the spec
@@ -321,6 +323,7 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     own = derived.usual[list(signal + derived.uncertain)]
     longest = max(g.trigger.interval_max for g in model.groups)
     table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]", np.eye(plant.n)[:, list(derived.states)])
+    ball = _zonotope(model, linear, T, sub, ranges, own, table, signal, derived, f"{model.path.name}: detector.observers[{i}]")
     paths = fault_paths(model, spec, spec.faults)
     blind = np.full(len(paths), np.inf)
     if paths and spec.filtered:
@@ -330,7 +333,28 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
         except (np.linalg.LinAlgError, ValueError):
             pass  # without the event error the factorisation may not exist; then there is nothing to compare with
     delay = fault_delays(bounded, o, f, paths, radius[outputs + inputs], spec.search.size) if spec.filtered else np.full(len(paths), np.nan)
-    return Generator(spec, bounded, o, f, linear, table, signal, own, found.smallest, found.first, delay, blind)
+    return Generator(spec, bounded, o, f, linear, table, ball, signal, own, found.smallest, found.first, delay, blind)
+
+
+def _zonotope(
+    model: Model,
+    linear: hull.Linear,
+    T: Array,
+    sub: SubPlant,
+    ranges: hull.Ranges,
+    radius: Array,
+    exact: hull.HullTables,
+    signal: tuple[int, ...],
+    derived: Derived,
+    where: str,
+) -> ZonotopeTable | None:
+    """The zonotope of a generator whose model asks for one."""
+    spec = model.detector
+    if spec.threshold == "exact":
+        return None
+    published = spec.threshold == "zonotope_published"
+    more = np.eye(model.plant.n)[:, list(derived.states)]
+    return zonotope.build(linear, T, sub, ranges, radius, exact, signal + derived.uncertain, spec.columns, TRUNCATE if published else BALL, where, published, more)
 
 
 def _feeds(model: Model, used: set[int]) -> int:
@@ -367,6 +391,7 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
         tail_output=tuple(float(x) for x in g.tables.tail_output),
         feeds=_feeds(model, {sent.get(i, i) for i in used}),
         faults=sum(1 << i for i, s in enumerate(size) if s < SEEN or predicted),
+        zonotope=g.zonotope,
     )
 
 

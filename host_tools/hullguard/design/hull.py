@@ -76,7 +76,7 @@ class Rounding:
     behind: Array  # residuals: what later lags can add for radii as wide as the ranges
 
 
-def _rounding(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int) -> Rounding:
+def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int) -> Rounding:
     """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius.
 
     `more` (order x derived): how radii enter e that come with no value; nothing is rounded where they enter, only what they do to e later.
@@ -180,7 +180,7 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
     weights = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
-    loss = _rounding(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX))
+    loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX))
     lags = loss.weight.shape[0]
     weights[:lags] += loss.weight
     steps = np.array([mul(np.abs(f), loss.into_e[:, None])[:, 0] for f in F])

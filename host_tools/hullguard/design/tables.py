@@ -13,6 +13,7 @@ import numpy as np
 from hullguard.design.arith import U32, nearest32, up32
 from hullguard.design.bank_table import BankTable
 from hullguard.design.ids import data_ids
+from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.schema import Frame, Group, Model, Signal
 from hullguard.model.table import Array
@@ -123,6 +124,7 @@ class GeneratorTable:
     tail_output: tuple[float, ...]
     feeds: int
     faults: int
+    zonotope: ZonotopeTable | None = None  # the threshold instead of the hull
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,8 @@ class Tables:
     @property
     def history(self) -> int:
         """Rows of the ring of radii."""
-        return max([g.taps + 1 for g in self.generators] + [b.window for b in self.banks])
+        taps = [g.taps + 1 for g in self.generators if g.zonotope is None]
+        return max(taps + [b.window for b in self.banks] + [g.interval_max + 1 for g in self.groups])
 
     @property
     def window(self) -> int:
@@ -182,6 +185,7 @@ class Tables:
     def reals(self) -> int:
         """hg_detector_reals(), evaluated here so that the generated storage has exactly that length."""
         own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
+        own += sum(g.zonotope.reals for g in self.generators if g.zonotope is not None)
         own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
         return 3 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
 
