@@ -13,7 +13,7 @@ from hullguard.design import hull, store
 from hullguard.design.arith import digits
 from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
-from hullguard.design.reach import reach
+from hullguard.design.reach import largest, reach
 from hullguard.design.search import FaultPath, between_events, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, Tables, group_table, message_table, rows
@@ -212,16 +212,6 @@ def _unique_ids(model: Model, tables: Tables) -> None:
                 raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{a.data_id[0]:02X}; give one another data_id")
 
 
-def _largest(model: Model, stored: Stored, place: int) -> float:
-    """Largest magnitude of a healthy signal: what it can reach, or its declared range."""
-    s = model.signals[place]
-    declared = max(abs(s.low), abs(s.high))
-    reached = float(stored.signal_reach[place])
-    if not np.isfinite(reached):
-        return declared
-    return min(declared, reached + abs(model.centre(place)) + s.resolution)
-
-
 def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator:
     spec, found = model.observers[i], stored.observers[i]
     sub = sub_plant(model, spec, radius)
@@ -232,7 +222,7 @@ def _generator(model: Model, i: int, stored: Stored, radius: Array) -> Generator
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
     outputs, inputs = [model.outputs[k] for k in spec.outputs], [model.inputs[k] for k in spec.inputs]
-    values = np.array([_largest(model, stored, k) for k in outputs + inputs])
+    values = np.array([largest(model, stored.signal_reach, k) for k in outputs + inputs])
     ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :])
     own = radius[outputs + inputs]
     longest = max(g.trigger.interval_max for g in model.groups)
