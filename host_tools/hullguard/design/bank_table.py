@@ -136,7 +136,7 @@ def _values(model: Model, stored: Stored, bank: StoredBank) -> Array:
 
 
 def _left(model: Model, bank: StoredBank, form: WindowForm, weight: Array, size: float) -> Array:
-    """sum |w'Gamma| fmax: what rounding leaves of the hypothesis' fault."""
+    """The sum |w'Gamma| fmax: what rounding leaves of the hypothesis' fault."""
     if bank.hypothesis is None:
         return np.zeros(len(weight))
     fault = model.faults[bank.hypothesis]

@@ -12,6 +12,7 @@ bounds change, so the solver starts from its last basis. The duals of the output
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import highspy
 import numpy as np
@@ -38,7 +39,7 @@ class Explanation:
         self._gain = plant.feedback.gain if feedback and plant.feedback is not None else None
         self._fold()
         rows = self._matrix(scale)
-        self._highs = highspy.Highs()
+        self._highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
         for option, value in (("output_flag", False), ("threads", 1)):
             self._highs.setOptionValue(option, value)
         self._highs.passModel(self._programme(rows))

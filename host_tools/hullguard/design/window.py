@@ -69,7 +69,7 @@ def window_form(plant: Plant, window: int, varying: Varying | None = None) -> Wi
 def fault_response(model: Model, form: WindowForm, fault: Fault) -> Array:
     """Gamma of a fault: what each sample of its time course adds to y - Mu u as the detector reads it; N m x N."""
     if fault.signal in model.outputs:
-        return np.kron(np.eye(form.window), np.eye(model.plant.m)[:, [model.outputs.index(fault.signal)]])
+        return np.asarray(np.kron(np.eye(form.window), np.eye(model.plant.m)[:, [model.outputs.index(fault.signal)]]), dtype=np.float64)
     own = form.Mu[:, model.inputs.index(fault.signal) :: model.plant.p]
     # An actuator's fault acts on the plant; a measured input's is subtracted where it has not acted.
     return own if fault.type == "actuator" else -own
