@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hullguard.campaign.tasks import Emulator, Tick, each
 from hullguard.design.bank_table import BankTable, StoredBank, full_weight, stored_weight
@@ -24,11 +26,14 @@ from hullguard.model.faults import FaultSpec
 from hullguard.model.schema import Model, Reference
 from hullguard.model.table import Array
 
+Real = TypeVar("Real", bound=np.floating)
+
 TRAINING = 2**63  # added to a seed: evaluations have the seeds below
 RUNS_TASK = 10
 SUPPORT = 1e-9  # of a dual's largest entry: what is below is the solver's dust
 DECOUPLED = 1e-7  # what may be left of O and Gamma after the projection, for a certificate of threshold 1
 CAP = 1.5  # samples
+POOL = 2000  # candidates
 FIRST_STAGE = 4  # certificates: a bank of 4, 8, 16 .. is as good as the choice can make it, each the beginning of the next
 
 
@@ -201,7 +206,9 @@ def candidates(model: Model, form: WindowForm, duals: Array, hypothesis: int | N
     kept = flat[np.abs(flat @ basis).max(1) <= DECOUPLED * np.abs(basis).max()]
     rounded = stored_weight(kept).reshape(-1, form.window, model.plant.m)
     _, first = np.unique(rounded.round(5), axis=0, return_index=True)
-    return rounded[np.sort(first)]
+    # A larger pool costs time and gains nothing.
+    first = np.sort(first)
+    return rounded[first[:: -(-len(first) // POOL)]]
 
 
 def project(w: Array, basis: Array) -> Array:
@@ -218,18 +225,19 @@ def project(w: Array, basis: Array) -> Array:
 
 def first_alarms(model: Model, form: WindowForm, weight: Array, training: Training) -> Array:
     """Delay of each certificate in each run: certificates x runs, the horizon where it never alarms."""
-    full = full_weight(model, form, weight).reshape(len(weight), -1)
-    size, own = np.abs(full), np.abs(weight.reshape(len(weight), -1) @ form.Md).sum(1)[:, None]
+    # Single precision is good enough for a choice, and twice as fast.
+    full = full_weight(model, form, weight).reshape(len(weight), -1).astype(np.float32)
+    size, own = np.abs(full), np.abs(weight.reshape(len(weight), -1) @ form.Md).sum(1)[:, None].astype(np.float32)
     horizon = training.value.shape[1] - form.window + 1
     delays = np.full((len(weight), training.runs), float(horizon))
     for i in range(training.runs):
-        value, radius = windows(training.value[i], form.window), windows(training.radius[i], form.window)
+        value, radius = (windows(a[i].astype(np.float32), form.window) for a in (training.value, training.radius))
         alarm = np.abs(full @ value.T) > size @ radius.T + own
         delays[:, i] = np.where(alarm.any(1), alarm.argmax(1), horizon)
     return delays
 
 
-def windows(rows: Array, window: int) -> Array:
+def windows(rows: NDArray[Real], window: int) -> NDArray[Real]:
     """Every window of consecutive rows, flattened with the oldest first: count x (window signals)."""
     view = np.lib.stride_tricks.sliding_window_view(rows, window, axis=0)  # count x signals x window
     return np.ascontiguousarray(view.transpose(0, 2, 1)).reshape(len(view), -1)
@@ -270,22 +278,18 @@ def _exchange(chosen: list[int], fixed: int, cost: Callable[[Sequence[int]], Arr
 
 
 def make_bank(design: Design, spec: BankSpec, workers: int = 1, tick: Callable[[str, int, int], None] = lambda *_: None) -> StoredBank:
-    """Collect and select. A bank without hypothesis can be explained by the faults it was made for, one with by all but the hypothesis."""
+    """Collect and select."""
     model = design.model
     training = collect(design, spec, workers, tick)
     form = window_form(model.plant, spec.window)
-    chosen = select(first_alarms(model, form, training.weight, training), training, spec.size)
-    weight = training.weight[chosen]
+    weight = training.weight[select(first_alarms(model, form, training.weight, training), training, spec.size)]
     return StoredBank(spec.window, weight, explained(model, form, weight, spec.hypothesis), spec.hypothesis)
 
 
 def explained(model: Model, form: WindowForm, weight: Array, hypothesis: int | None) -> int:
-    """Mask of the faults that can move a certificate; the hypothesis' own never does."""
-    w, mask = weight.reshape(len(weight), -1), 0
-    for i, fault in enumerate(model.faults):
-        if i != hypothesis and np.abs(w @ fault_response(model, form, fault)).max() > 1e-6:
-            mask |= 1 << i
-    return mask
+    """Mask of the faults that can move a certificate: all but the hypothesis, and those that none sees at all."""
+    w = weight.reshape(len(weight), -1)
+    return sum(1 << i for i, fault in enumerate(model.faults) if i != hypothesis and (w @ fault_response(model, form, fault)).any())
 
 
 def shortened(bank: StoredBank, size: int) -> StoredBank:

@@ -12,6 +12,7 @@ bounds change, so the solver starts from its last basis. The duals of the output
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import highspy
@@ -20,10 +21,40 @@ import scipy.sparse
 
 from hullguard.design.window import Varying, no_varying
 from hullguard.errors import InputError
+from hullguard.model.plant import Plant
 from hullguard.model.schema import Fault, Model
 from hullguard.model.table import Array
 
 EXPLAINED = 1e-5  # t up to which values count as explained: a small part of a radius, far above the solver's tolerance
+
+
+@dataclass(frozen=True)
+class Folded:
+    """The errors of a plant. A disturbance that enters one equation alone is a part of that equation's bound; only the others need variables."""
+
+    slack_x: Array  # n
+    slack_y: Array  # m
+    into_x: Array  # n x errors: inputs, varying disturbances, the others
+    into_y: Array  # m x errors
+    fixed: int  # of them, how many have the bound 1
+
+
+def folded(plant: Plant, varying: Varying) -> Folded:
+    """Errors of the inputs, whose bounds are radii, then the varying disturbances, then the disturbances that enter several equations."""
+    both = np.vstack([plant.Ed, plant.Fd])
+    single = (both != 0).sum(0) == 1
+    bound = np.abs(both[:, single]).sum(1)
+    into_x = np.hstack([plant.B, varying.into_x, plant.Ed[:, ~single]])
+    into_y = np.hstack([plant.D, varying.into_y, plant.Fd[:, ~single]])
+    return Folded(bound[: plant.n], bound[plant.n :], into_x, into_y, int((~single).sum()))
+
+
+def equations(plant: Plant, errors: Folded, window: int) -> tuple[Any, Any]:
+    """Rows of the state equations and of the outputs of a window, sparse; columns are the states of every sample, then its errors."""
+    each, now, following = np.eye(window), np.eye(window - 1, window), np.eye(window - 1, window, 1)
+    x = scipy.sparse.hstack([scipy.sparse.kron(following, np.eye(plant.n)) - scipy.sparse.kron(now, plant.A), -scipy.sparse.kron(now, errors.into_x)])
+    y = scipy.sparse.hstack([scipy.sparse.kron(each, plant.C), scipy.sparse.kron(each, errors.into_y)])
+    return x.tocsr(), y.tocsr()
 
 
 class Explanation:
@@ -35,9 +66,8 @@ class Explanation:
         if feedback and plant.feedback is None:
             raise InputError(f"{model.path.name}: detector.feedback_known needs [plant] feedback")
         self.model, self.window = model, window
-        self._varying = varying or no_varying(plant)
         self._gain = plant.feedback.gain if feedback and plant.feedback is not None else None
-        self._fold()
+        self._errors = folded(plant, varying or no_varying(plant))
         rows = self._matrix(scale)
         self._highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
         for option, value in (("output_flag", False), ("threads", 1)):
@@ -45,29 +75,15 @@ class Explanation:
         self._highs.passModel(self._programme(rows))
         self._every_row, self._every_column = np.arange(rows.shape[0], dtype=np.int32), np.arange(rows.shape[1], dtype=np.int32)
 
-    def _fold(self) -> None:
-        """A disturbance that enters one equation alone is a part of that equation's bound; only the others need variables."""
-        plant = self.model.plant
-        both = np.vstack([plant.Ed, plant.Fd])
-        single = (both != 0).sum(0) == 1
-        bound = np.abs(both[:, single]).sum(1)
-        self._slack_x, self._slack_y = bound[: plant.n], bound[plant.n :]
-        into_x = np.hstack([plant.B, self._varying.into_x, plant.Ed[:, ~single]])
-        into_y = np.hstack([plant.D, self._varying.into_y, plant.Fd[:, ~single]])
-        self._into_x, self._into_y = into_x, into_y
-        self._fixed = int((~single).sum())
-
-    def _matrix(self, scale: Array) -> scipy.sparse.csr_matrix:
+    def _matrix(self, scale: Array) -> Any:
         """Rows: state equations, outputs from below and from above, feedback likewise. Columns: states, errors, t."""
         plant, N = self.model.plant, self.window
-        each, now, following = np.eye(N), np.eye(N - 1, N), np.eye(N - 1, N, 1)
-        x = scipy.sparse.hstack([scipy.sparse.kron(following, np.eye(plant.n)) - scipy.sparse.kron(now, plant.A), -scipy.sparse.kron(now, self._into_x)])
-        y = scipy.sparse.hstack([scipy.sparse.kron(each, plant.C), scipy.sparse.kron(each, self._into_y)])
+        x, y = equations(plant, self._errors, N)
         t = scipy.sparse.csr_matrix(np.tile(scale, N)[:, None])
         blocks = [[x, scipy.sparse.csr_matrix((x.shape[0], 1))], [y, t], [y, -t]]
         if self._gain is not None:
-            own = np.hstack([np.eye(plant.p), np.zeros((plant.p, self._into_x.shape[1] - plant.p))])
-            u = scipy.sparse.hstack([scipy.sparse.kron(each, self._gain), scipy.sparse.kron(each, own)])
+            own = np.hstack([np.eye(plant.p), np.zeros((plant.p, self._errors.into_x.shape[1] - plant.p))])
+            u = scipy.sparse.hstack([scipy.sparse.kron(np.eye(N), self._gain), scipy.sparse.kron(np.eye(N), own)])
             # Any positive scale keeps the programme solvable; this one is the command that a usual radius of the states would make.
             t_u = scipy.sparse.csr_matrix(np.tile(np.abs(self._gain).sum(1) * scale.max(), N)[:, None])
             blocks += [[u, t_u], [u, -t_u]]
@@ -75,7 +91,7 @@ class Explanation:
         rows.eliminate_zeros()
         return rows
 
-    def _programme(self, rows: scipy.sparse.csr_matrix) -> highspy.HighsLp:
+    def _programme(self, rows: Any) -> highspy.HighsLp:
         lp = highspy.HighsLp()
         lp.num_row_, lp.num_col_ = rows.shape
         cost = np.zeros(rows.shape[1])
@@ -94,21 +110,21 @@ class Explanation:
         """
         model, plant, N = self.model, self.model.plant, self.window
         y, u = value[:, model.outputs], value[:, model.inputs]
-        ry, ru = radius[:, model.outputs] + self._slack_y, radius[:, model.inputs].copy()
+        ry, ru = radius[:, model.outputs] + self._errors.slack_y, radius[:, model.inputs].copy()
         if free is not None and free.signal in model.outputs:
             ry[:, model.outputs.index(free.signal)] = math.inf
         elif free is not None:
             ru[:, model.inputs.index(free.signal)] = math.inf
         driven, direct = (u @ plant.B.T)[:-1], y - u @ plant.D.T
         none = np.full(y.size, math.inf)
-        lower = [(driven - self._slack_x).ravel(), (direct - ry).ravel(), -none]
-        upper = [(driven + self._slack_x).ravel(), none, (direct + ry).ravel()]
+        lower = [(driven - self._errors.slack_x).ravel(), (direct - ry).ravel(), -none]
+        upper = [(driven + self._errors.slack_x).ravel(), none, (direct + ry).ravel()]
         if self._gain is not None:
             command, half = self._command(u, reference)
             lower += [(command - half).ravel(), np.full(command.size, -math.inf)]
             upper += [np.full(command.size, math.inf), (command + half).ravel()]
         more = np.zeros((N, 0)) if varying_radius is None else varying_radius
-        errors = np.hstack([ru, more, np.ones((N, self._fixed))]).ravel()
+        errors = np.hstack([ru, more, np.ones((N, self._errors.fixed))]).ravel()
         states = np.full(N * plant.n, math.inf)
         self._highs.changeRowsBounds(len(self._every_row), self._every_row, np.concatenate(lower), np.concatenate(upper))
         bound = np.concatenate([states, errors])
