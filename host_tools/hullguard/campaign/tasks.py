@@ -9,8 +9,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from typing import Any, TypeVar
 
+import numpy as np
+
 from hullguard.core.library import library
-from hullguard.core.native import Batch, Native
+from hullguard.core.native import Batch, Native, Plant
 from hullguard.design.design import finish
 from hullguard.design.store import Stored
 from hullguard.model.faults import FaultSpec
@@ -36,6 +38,21 @@ class Emulator:
     def trace(self, samples: int, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int) -> dict[str, Array]:
         """One run as Batch.trace() gives it."""
         return Batch(self.native, self.design, samples, reference, faults, seed).trace(run)
+
+    def reference(self, samples: int, reference: Reference, seed: int, run: int) -> Array:
+        """What drives the plant of a run, u_ref (samples x p), as far as the wire tells it: within half a code of each input.
+
+        It is read off the run without faults, u_ref = u - u_eq + K (x - x_eq): faults do not move it.
+        """
+        model = self.design.model
+        plant, feedback = Plant(self.native, self.design, reference, (), seed, run), model.plant.feedback
+        assert feedback is not None
+        rows = []
+        for _ in range(samples):
+            u = np.array(plant.read())[model.inputs]
+            rows.append(u - model.plant.equilibrium_input + feedback.gain @ (np.array(plant.state) - model.plant.equilibrium))
+            plant.move()
+        return np.array(rows)
 
 
 def _enter(begin: Callable[[Any], Any], job: Any) -> None:

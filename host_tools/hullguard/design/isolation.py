@@ -20,7 +20,6 @@ from hullguard.design.limit import equations, folded
 from hullguard.design.window import fault_response, no_varying, window_form
 from hullguard.errors import InputError
 from hullguard.model.schema import Fault, Model
-from hullguard.model.table import Array
 
 WITHIN = 10  # samples
 SEPARATE = 1e-6  # share of a fault's response that must be left outside the span of O and Gamma_j
@@ -123,4 +122,3 @@ def isolation_banks(design: Design, spec: BankSpec, workers: int = 1, tick: Call
     if not found:
         raise InputError(f"{design.model.path.name}: none of its faults can be told from another: measure more")
     return found
-

@@ -20,7 +20,6 @@ import numpy as np
 import scipy.sparse
 
 from hullguard.design.window import Varying, no_varying
-from hullguard.errors import InputError
 from hullguard.model.plant import Plant
 from hullguard.model.schema import Fault, Model
 from hullguard.model.table import Array
@@ -63,8 +62,6 @@ class Explanation:
     def __init__(self, model: Model, window: int, scale: Array, varying: Varying | None = None, feedback: bool = False) -> None:
         """`scale` (m) is what t is counted in, an output's usual radius. `feedback`: the loop is known, u = u_eq - K (x - x_eq) + u_ref."""
         plant = model.plant
-        if feedback and plant.feedback is None:
-            raise InputError(f"{model.path.name}: detector.feedback_known needs [plant] feedback")
         self.model, self.window = model, window
         self._gain = plant.feedback.gain if feedback and plant.feedback is not None else None
         self._errors = folded(plant, varying or no_varying(plant))

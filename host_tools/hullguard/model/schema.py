@@ -146,6 +146,7 @@ class Model:
     signals: tuple[Signal, ...]
     groups: tuple[Group, ...]
     observers: tuple[Observer, ...]
+    feedback_known: bool  # the detector may use u = u_eq - K (x - x_eq) + u_ref: the limit is also computed with it
     verdict: Frame
     status: Frame
     heartbeat: int
@@ -289,7 +290,11 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     _unique([f.name for f in faults] + [s.name for s in signals], f"{path.name}: faults and signals")
     if len(faults) > FAULTS_MAX:
         raise InputError(f"{path.name}: {len(faults)} faults, the verdict frame has room for {FAULTS_MAX}")
-    observers = _read_observers(top.table("detector"), outputs, inputs, faults)
+    detector = top.table("detector")
+    feedback_known = detector.flag("feedback_known", False)
+    if feedback_known and plant.feedback is None:
+        raise detector.error("feedback_known", "there is no [plant] feedback to know; give one, or remove this")
+    observers = _read_observers(detector, outputs, inputs, faults)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     scenarios = _read_scenarios(top, path)
     network = top.table("network", optional=True)
@@ -308,6 +313,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         signals=signals,
         groups=groups,
         observers=observers,
+        feedback_known=feedback_known,
         verdict=verdict,
         status=status,
         heartbeat=heartbeat,
