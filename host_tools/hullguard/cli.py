@@ -152,6 +152,16 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--out", metavar="DIR", help="write campaign.json there")
     _expect(p)
 
+    p = add("limit", "delay of each detector beside the earliest that a sound one could have")
+    _common(p)
+    _scenario(p)
+    _length(p)
+    p.add_argument("--fault", action="append", default=[], metavar="NAME", help="a fault of the model, as a bias from the middle of the run on (default: each); may be repeated")
+    p.add_argument("--size", default="0.5,1,2", metavar="X[,X..]", help="sizes of each fault (default 0.5,1,2)")
+    p.add_argument("--runs", type=_positive, default=20, metavar="N", help="runs of each fault and size (default 20)")
+    p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
+    p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
+
     p = add("report", "draw report.html from the files of a run")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run")
     p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
@@ -169,6 +179,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "detect": commands.run_detect,
         "plant": commands.run_plant,
         "campaign": commands.run_campaign,
+        "limit": commands.run_limit,
         "report": commands.run_report,
     }
 

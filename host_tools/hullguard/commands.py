@@ -516,6 +516,49 @@ def run_campaign(args: argparse.Namespace) -> int:
     return 0
 
 
+def run_limit(args: argparse.Namespace) -> int:
+    """`hullguard limit`."""
+    from hullguard.campaign.limit_study import RUNS_TASK, LimitJob, limit_study
+    from hullguard.report.limit_table import show_limits
+
+    model, made = prepared(args)
+    scenario = model.scenario(args.scenario)
+    known = [f.name for f in model.faults]
+    for name in args.fault:
+        if name not in known:
+            raise InputError(f"--fault '{name}': model {model.name} has no such fault: {', '.join(known) or 'none'}")
+    faults, sizes = list(dict.fromkeys(args.fault or known)), _sizes(args.size)
+    if not faults:
+        raise InputError(f"model {model.name} has no faults to look for: add [[faults]]")
+    job = LimitJob(made.model, made.stored, args.real, args.window, args.samples or scenario.samples, scenario.reference, args.seed)
+    with progress(args, "limit") as tick:
+        done, total = [0], len(faults) * len(sizes) * -(-args.runs // RUNS_TASK)
+
+        def more(count: int) -> None:
+            done[0] += count
+            tick("parts", done[0], total)
+
+        rows = limit_study(job, faults, sizes, args.runs, args.workers or os.cpu_count() or 1, more)
+    if not args.quiet:
+        show_limits(rows, job.start, model.name, scenario.name, sys.stderr if args.json else sys.stdout)
+    emit(args, {
+        "model": model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "scenario": scenario.name, "seed": args.seed,
+        "samples": job.samples, "start": job.start, "window": job.window, "rows": rows,
+    })  # fmt: skip
+    return 0
+
+
+def _sizes(text: str) -> list[float]:
+    """The numbers of --size, each once, in their order."""
+    try:
+        sizes = [float(part) for part in text.split(",")]
+    except ValueError:
+        sizes = []
+    if not sizes or not all(math.isfinite(s) and s != 0.0 for s in sizes):
+        raise InputError(f"--size '{text}': expected numbers other than 0, for example 0.5,1,2")
+    return list(dict.fromkeys(sizes))
+
+
 def run_report(args: argparse.Namespace) -> int:
     """`hullguard report`."""
     directory = Path(args.directory)

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hullguard.codegen.names import Names, names_of, unit_of
-from hullguard.design.bank_table import BankTable
+from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
 from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, SignalTable, Tables
 from hullguard.design.zonotope_table import BALL, BOX, TRUNCATE, ZonotopeTable

@@ -406,6 +406,11 @@ class Plant:
         self._native.library.lib.hgh_plant_read(self._plant, self._native.library.ffi.NULL, self._value)
         return list(self._value)
 
+    @property
+    def state(self) -> list[float]:
+        """True states of the open sample."""
+        return list(self._native.library.ffi.unpack(self._plant.x, self._config.config.n))
+
     def move(self) -> None:
         """On to the next sample."""
         self._native.library.lib.hgh_plant_move(self._plant)

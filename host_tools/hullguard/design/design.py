@@ -15,7 +15,7 @@ from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
 from hullguard.design.predict import Bounds, predict_table, predicted_groups
-from hullguard.design.reach import reach
+from hullguard.design.reach import largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
@@ -258,17 +258,7 @@ def _unique_ids(model: Model, tables: Tables) -> None:
 
 def _disturbed(model: Model, state: Array, signal: Array) -> Model:
     """The model with its intervals as a bounded disturbance. `state` (n) and `signal` (signals) are of its reach."""
-    return disturbed(model, state, np.array([_largest(model, signal, i) for i in range(len(model.signals))]))
-
-
-def _largest(model: Model, signal_reach: Array, place: int) -> float:
-    """Largest magnitude of a healthy signal: what it can reach, or its declared range."""
-    s = model.signals[place]
-    declared = max(abs(s.low), abs(s.high))
-    reached = float(signal_reach[place])
-    if not np.isfinite(reached):
-        return declared
-    return min(declared, reached + abs(model.centre(place)) + s.resolution)
+    return disturbed(model, state, np.array([largest(model, signal, i) for i in range(len(model.signals))]))
 
 
 @dataclass(frozen=True)
@@ -286,7 +276,7 @@ class Derived:
 
 def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> Derived:
     usual, place = usual_radius(model), {}
-    values = np.array([_largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
+    values = np.array([largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
     spread = constant_mismatch(model, stored.state_range, values)
     bounds = Bounds(stored.state_range, values[model.inputs], spread)
     predictors = tuple(predict_table(model, i, groups, bounds) for i in predicted_groups(model)) if model.detector.prediction else ()
@@ -317,7 +307,7 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     f = replace(solved, Lo=found.Lo, Mo=found.Mo)
     linear = hull.rounded(*fused(o, f))
     plant = model.plant
-    values = np.array([_largest(model, stored.signal_reach, k) for k in outputs + inputs])
+    values = np.array([largest(model, stored.signal_reach, k) for k in outputs + inputs])
     ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :], derived.largest)
     signal = tuple(derived.place.get(k, k) for k in outputs + inputs)
     own = derived.usual[list(signal + derived.uncertain)]

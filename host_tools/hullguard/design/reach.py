@@ -252,3 +252,13 @@ def _sums(A: Array, Bw: Array, Cs: Array, Dw: Array, initial: Array, horizon: in
         later = np.concatenate([x0[j:], np.zeros((j, *x0.shape[1:]))])
         slew[:, j - 1] = (driven + np.abs(later - x0).sum(2)).max(0)
     return state, signal, slew
+
+
+def largest(model: Model, signal_reach: Array, place: int) -> float:
+    """Largest magnitude of a healthy signal: what it can reach, or its declared range."""
+    s = model.signals[place]
+    declared = max(abs(s.low), abs(s.high))
+    reached = float(signal_reach[place])
+    if not np.isfinite(reached):
+        return declared
+    return min(declared, reached + abs(model.centre(place)) + s.resolution)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.design.arith import U32, nearest32, up32
-from hullguard.design.bank_table import BankTable
+from hullguard.design.bank_types import BankTable
 from hullguard.design.ids import data_ids
 from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError

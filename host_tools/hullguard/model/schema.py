@@ -315,6 +315,8 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         raise InputError(f"{path.name}: {len(faults)} faults, the verdict frame has room for {FAULTS_MAX}")
     inner = top.table("detector")
     detector = read_detector(inner)
+    if detector.feedback_known and plant.feedback is None:
+        raise inner.error("feedback_known", "there is no [plant] feedback to know; give one, or remove this")
     observers = _read_observers(inner, outputs, inputs, faults, detector.bank is None)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     scenarios = _read_scenarios(top, path)

@@ -1,0 +1,94 @@
+"""Work spread over processes whose result does not depend on how many there are, and the emulated runs that such work looks at."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hullguard.core.library import library
+from hullguard.core.native import Batch, Native, Plant
+from hullguard.design.design import finish
+from hullguard.design.store import Stored
+from hullguard.model.faults import FaultSpec
+from hullguard.model.schema import Model, Reference
+from hullguard.model.table import Array
+
+Job = TypeVar("Job")
+Context = TypeVar("Context")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Tick = Callable[[int], None]  # items that have just ended
+
+_context: dict[str, Any] = {}  # of this worker: what every item needs is made once a process
+
+
+class Emulator:
+    """Runs of one design, sample by sample."""
+
+    def __init__(self, model: Model, stored: Stored, real: str = "f32") -> None:
+        self.design = finish(model, stored)
+        self.native = Native(library(real), self.design.tables)
+
+    def trace(self, samples: int, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int) -> dict[str, Array]:
+        """One run as Batch.trace() gives it."""
+        return Batch(self.native, self.design, samples, reference, faults, seed).trace(run)
+
+    def reference(self, samples: int, reference: Reference, seed: int, run: int) -> Array:
+        """What drives the plant of a run, u_ref (samples x p), as far as the wire tells it: within half a code of each input.
+
+        It is read off the run without faults, u_ref = u - u_eq + K (x - x_eq): faults do not move it.
+        """
+        model = self.design.model
+        plant, feedback = Plant(self.native, self.design, reference, (), seed, run), model.plant.feedback
+        assert feedback is not None
+        rows = []
+        for _ in range(samples):
+            u = np.array(plant.read())[model.inputs]
+            rows.append(u - model.plant.equilibrium_input + feedback.gain @ (np.array(plant.state) - model.plant.equilibrium))
+            plant.move()
+        return np.array(rows)
+
+
+def _enter(begin: Callable[[Any], Any], job: Any) -> None:
+    _context["made"] = begin(job)
+
+
+def _one(work: Callable[[Any, Any], Any], item: Any) -> Any:
+    return work(_context["made"], item)
+
+
+def each(begin: Callable[[Job], Context], work: Callable[[Context, Item], Result], job: Job, items: Sequence[Item], workers: int, tick: Tick) -> list[Result]:
+    """work(begin(job), item) of every item, in the order of the items. Both functions live in modules: they are called in other processes."""
+    if workers <= 1 or len(items) <= 1:
+        made, results = begin(job), []
+        for item in items:
+            results.append(work(made, item))
+            tick(1)
+        return results
+    with ProcessPoolExecutor(min(workers, len(items)), mp_context=multiprocessing.get_context("spawn"), initializer=_enter, initargs=(begin, job)) as pool:
+        try:
+            waiting = _submitted(pool, work, items)
+            for done in as_completed(waiting):
+                done.result()
+                tick(1)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        return [done.result() for done in waiting]
+
+
+def _submitted(pool: ProcessPoolExecutor, work: Callable[[Any, Any], Any], items: Sequence[Any]) -> list[Future[Any]]:
+    """The first tasks start the workers, which must not hear Ctrl-C: it is the parent's to end them."""
+    if threading.current_thread() is not threading.main_thread():
+        return [pool.submit(_one, work, item) for item in items]
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        return [pool.submit(_one, work, item) for item in items]
+    finally:
+        signal.signal(signal.SIGINT, before)
