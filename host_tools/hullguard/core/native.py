@@ -392,13 +392,16 @@ class Recording:
 
 
 RESULT = (
-    *("measurement", "closing", "verdicts", "lost", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
-    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_after", "candidates", "plant"),
+    *("measurement", "closing", "verdicts", "lost", "silent", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
+    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_settled", "margin_after", "candidates", "plant"),
 )
 
 
 class Batch:
-    """Runs of one configuration in C: plant or recording, senders, losses, detector node, all in one process."""
+    """Runs of one configuration in C: plant or recording, senders, losses, detector node, all in one process.
+
+    Arrays of doubles (series, disturbance, initial) are read where they lie: what is written into them counts from the next run on.
+    """
 
     def __init__(
         self,
@@ -414,6 +417,7 @@ class Batch:
         noise: bool = False,
         disturbance: Array | None = None,
         initial: Array | None = None,
+        burst: int = 0,
     ) -> None:
         ffi, model = native.library.ffi, design.model
         self._native, self._model = native, model
@@ -440,7 +444,7 @@ class Batch:
             c.initial = doubles(initial)
         c.reference, c.fault, c.faults = reference_of(native.library, reference), self._keep[1], len(faults)
         c.signals, c.samples, c.sample_time_s = len(model.signals), samples, model.sample_time_s
-        c.loss, c.seed, c.start = loss, seed, start
+        c.loss, c.burst, c.seed, c.start = loss, burst, seed, start
         self.config = c
 
     def runs(self, first: int, count: int) -> list[dict[str, Any]]:
@@ -452,22 +456,22 @@ class Batch:
         return [{name: getattr(results[i], name) for name in RESULT} | {"run": first + i} for i in range(count)]
 
     def trace(self, run: int = 0) -> dict[str, Array]:
-        """One run sample by sample: reading, value, radius (samples x signals), r, J (samples x residuals), events, plant, bus, bits."""
+        """One run sample by sample: reading, value, radius, promise (samples x signals), r, J (samples x residuals), events, lost, plant, bus, bits."""
         lib, ffi, t = self._native.library.lib, self._native.library.ffi, self._native.tables
         made = lib.hgh_run_new(self.config, run)
         if made == ffi.NULL:
             raise InputError(f"model {self._model.name}: the emulator refused the configuration")
-        rows: dict[str, list[Any]] = {name: [] for name in ("reading", "value", "radius", "r", "J", "events", "plant", "bus", "bits")}
+        rows: dict[str, list[Any]] = {name: [] for name in ("reading", "value", "radius", "promise", "r", "J", "events", "lost", "plant", "bus", "bits")}
         try:
             more = True
             while more:
                 more = lib.hgh_run_steps(made, 1)
                 view = lib.hgh_run_view(made)
-                for name in ("reading", "value", "radius"):
+                for name in ("reading", "value", "radius", "promise"):
                     rows[name].append(ffi.unpack(getattr(view, name), t.signals))
                 for name in ("r", "J"):
                     rows[name].append(ffi.unpack(getattr(view, name), t.residuals))
-                for name in ("events", "plant", "bus", "bits"):
+                for name in ("events", "lost", "plant", "bus", "bits"):
                     rows[name].append(getattr(view, name))
         finally:
             lib.hgh_run_free(made)
