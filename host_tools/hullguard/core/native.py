@@ -458,19 +458,18 @@ class Batch:
     def trace(self, run: int = 0) -> dict[str, Array]:
         """One run sample by sample: reading, value, radius, promise (samples x signals), r, J (samples x residuals), events, lost, plant, bus, bits."""
         lib, ffi, t = self._native.library.lib, self._native.library.ffi, self._native.tables
+        lengths = dict.fromkeys(("reading", "value", "radius", "promise"), t.signals) | dict.fromkeys(("r", "J"), t.residuals)
         made = lib.hgh_run_new(self.config, run)
         if made == ffi.NULL:
             raise InputError(f"model {self._model.name}: the emulator refused the configuration")
-        rows: dict[str, list[Any]] = {name: [] for name in ("reading", "value", "radius", "promise", "r", "J", "events", "lost", "plant", "bus", "bits")}
+        rows: dict[str, list[Any]] = {name: [] for name in (*lengths, "events", "lost", "plant", "bus", "bits")}
         try:
             more = True
             while more:
                 more = lib.hgh_run_steps(made, 1)
                 view = lib.hgh_run_view(made)
-                for name in ("reading", "value", "radius", "promise"):
-                    rows[name].append(ffi.unpack(getattr(view, name), t.signals))
-                for name in ("r", "J"):
-                    rows[name].append(ffi.unpack(getattr(view, name), t.residuals))
+                for name, length in lengths.items():
+                    rows[name].append(ffi.unpack(getattr(view, name), length))
                 for name in ("events", "lost", "plant", "bus", "bits"):
                     rows[name].append(getattr(view, name))
         finally:
