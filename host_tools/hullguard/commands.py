@@ -23,7 +23,7 @@ from hullguard.bus import candump, choose
 from hullguard.bus.link import opened
 from hullguard.campaign import grid
 from hullguard.campaign.campaign import Way, campaign, processes
-from hullguard.campaign.case import Case
+from hullguard.campaign.case import Case, setup_of
 from hullguard.campaign.chunks import Chunks
 from hullguard.campaign.result import campaign_result, describe, write_results
 from hullguard.campaign.table import check_table, table, write_table
@@ -498,8 +498,7 @@ def _campaign_cases(args: argparse.Namespace, keep: Path | None) -> list[Case]:
         faults = the_faults(args, made.model, scenario.faults, samples)
         if attack and min((f.start for f in faults), default=1) < 1:
             raise InputError("--attack aims at samples before the first fault: let it start at sample 1 or later")
-        base = Case(made.model, made.stored, made.tables.hash, args.real, library(args.real).digest, samples, scenario.reference, (), args.seed)
-        base = replace(base, attack=attack, varied=tuple(varied.items()))
+        base = Case(setup_of(made, args.real), samples, scenario.reference, (), args.seed, attack=attack, varied=tuple(varied.items()))
         cases += [replace(base, faults=f, loss=p, burst=b) for f in grid.fault_sets(faults, args.each_fault, sizes) for p in losses for b in bursts]
     return cases
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -28,15 +28,56 @@ FLOATS = ("margin", "margin_settled", "margin_after")
 COLUMNS = ("run", "attacked", *RESULT)
 
 
+class Keyed:
+    """Equal to what has the same key: models hold arrays, which have no equality of their own."""
+
+    @property
+    def key(self) -> str:
+        """Digest of all that counts."""
+        raise NotImplementedError
+
+    def __eq__(self, other: object) -> bool:
+        """By key."""
+        return isinstance(other, type(self)) and self.key == other.key
+
+    def __hash__(self) -> int:
+        """By key."""
+        return hash(self.key)
+
+
+def _digest(facts: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
 @dataclass(frozen=True, eq=False)
-class Case:
-    """Two cases with the same key give the same rows, on any machine with the same build of the library."""
+class Setup(Keyed):
+    """A designed model and the build of the library that runs it."""
 
     model: Model
     stored: Stored
     model_hash: int  # of the finished tables
     real: str
     build: str  # of the C library: its digest
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of all that a run depends on here."""
+        plant = self.model.plant
+        matrices = (self.stored.A, self.stored.B, plant.C, plant.D, plant.Ed, plant.Fd) + (() if self.stored.gain is None else (self.stored.gain,))
+        numbers = [hashlib.sha256(np.ascontiguousarray(m).tobytes()).hexdigest() for m in matrices]
+        return _digest({"model": self.model.sha256, "tables": self.model_hash, "plant": numbers, "real": self.real, "build": self.build})
+
+
+def setup_of(made: Design, real: str) -> Setup:
+    """A finished design with this machine's library."""
+    return Setup(made.model, made.stored, made.tables.hash, real, library(real).digest)
+
+
+@dataclass(frozen=True, eq=False)
+class Case(Keyed):
+    """Two cases with the same key give the same rows, on any machine with the same build of the library."""
+
+    setup: Setup
     samples: int
     reference: Reference
     faults: tuple[FaultSpec, ...]
@@ -50,33 +91,8 @@ class Case:
     @cached_property
     def key(self) -> str:
         """Digest of all that the rows depend on."""
-        plant = self.model.plant
-        matrices = (self.stored.A, self.stored.B, plant.C, plant.D, plant.Ed, plant.Fd) + (() if self.stored.gain is None else (self.stored.gain,))
-        facts = {
-            "version": VERSION,
-            "model": self.model.sha256,
-            "tables": self.model_hash,
-            "plant": [hashlib.sha256(np.ascontiguousarray(m).tobytes()).hexdigest() for m in matrices],
-            "real": self.real,
-            "build": self.build,
-            "samples": self.samples,
-            "reference": asdict(self.reference),
-            "faults": [asdict(f) for f in self.faults],
-            "seed": self.seed,
-            "loss": self.loss,
-            "burst": self.burst,
-            "attack": self.attack,
-            "start": self.start,
-        }
-        return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
-
-    def __eq__(self, other: object) -> bool:
-        """By key."""
-        return isinstance(other, Case) and self.key == other.key
-
-    def __hash__(self) -> int:
-        """By key."""
-        return hash(self.key)
+        facts = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("setup", "varied", "reference", "faults")}
+        return _digest(facts | {"version": VERSION, "setup": self.setup.key, "reference": asdict(self.reference), "faults": [asdict(f) for f in self.faults]})
 
     @property
     def fault_start(self) -> int | None:
@@ -86,7 +102,7 @@ class Case:
     @property
     def senders(self) -> int:
         """Groups that would send a frame every sample if they knew no trigger; the closing one does."""
-        return sum(1 for g in self.model.groups if not g.closing)
+        return sum(1 for g in self.setup.model.groups if not g.closing)
 
     def attacked(self, run: int) -> bool:
         """Whether this run is one of the attacked ones, which are spread evenly."""
@@ -107,7 +123,7 @@ class Case:
         """What tells this case from the others."""
         return {
             **dict(self.varied),
-            "model_hash": f"{self.model_hash:08x}",
+            "model_hash": f"{self.setup.model_hash:08x}",
             "seed": self.seed,
             "fault": self.fault,
             "size": self.size,
@@ -118,10 +134,15 @@ class Case:
 
 
 @lru_cache(maxsize=4)  # tables cost as much as many runs
+def _native(setup: Setup) -> tuple[Native, Design]:
+    design = finish(setup.model, setup.stored)
+    return Native(library(setup.real), design.tables), design
+
+
+@lru_cache(maxsize=4)  # of the cases whose chunks are worked off at a time
 def _ready(case: Case) -> tuple[Batch, Attack | None]:
     """The case's runs as they come, and those under attack."""
-    design = finish(case.model, case.stored)
-    native = Native(library(case.real), design.tables)
+    native, design = _native(case.setup)
     return _batch(case, native, design), _attack(case, native, design) if case.attack > 0.0 else None
 
 

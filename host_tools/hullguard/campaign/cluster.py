@@ -26,7 +26,7 @@ def cluster(address: str, workers: int) -> Iterator[Way]:
         try:
             if address == "local":
                 with deaf():
-                    own = dask.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL)
+                    own = dask.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL)
                 client = dask.Client(stack.enter_context(own), timeout=PATIENCE_S)
             else:
                 client = dask.Client(address, timeout=PATIENCE_S)
