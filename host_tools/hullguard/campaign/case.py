@@ -148,7 +148,7 @@ def _ready(case: Case) -> tuple[Batch, Attack | None]:
 
 def _batch(case: Case, native: Native, design: Design, **chosen: Any) -> Batch:
     """The only place where a case becomes a configuration of the batch loop."""
-    return Batch(native, design, case.samples, case.reference, case.faults, case.seed, case.loss, case.start, burst=case.burst, **chosen)
+    return Batch(native, design, case.samples, case.reference, case.faults, case.seed, case.loss, case.start, case.burst, **chosen)
 
 
 def _attack(case: Case, native: Native, design: Design) -> Attack:

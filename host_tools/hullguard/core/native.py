@@ -413,11 +413,11 @@ class Batch:
         seed: int = 1,
         loss: float = 0.0,
         start: int = REST,
+        burst: int = 0,
         series: Array | None = None,
         noise: bool = False,
         disturbance: Array | None = None,
         initial: Array | None = None,
-        burst: int = 0,
     ) -> None:
         ffi, model = native.library.ffi, design.model
         self._native, self._model = native, model
