@@ -526,6 +526,7 @@ def run_campaign(args: argparse.Namespace) -> int:
     if out is not None:
         make_folder(out / "designs")
     cases = _campaign_cases(args, out / "designs" if out else None)
+    kept = Chunks(out / "chunks") if out else None
     began = time.monotonic()
     with progress(args, "campaign") as tick, _way(args) as way:
         done = [0] * len(cases)
@@ -534,13 +535,14 @@ def run_campaign(args: argparse.Namespace) -> int:
             done[place] += count
             tick("runs", sum(done), args.runs * len(cases))
 
-        parts = list(zip(cases, campaign(cases, args.runs, way, more, Chunks(out / "chunks") if out else None), strict=True))
+        parts = list(zip(cases, campaign(cases, args.runs, way, more, kept), strict=True))
     result = campaign_result(parts, args.scenario)
     took = time.monotonic() - began
     notes = write_results(out, parts, result) if out else []
     if args.table:
         write_table(Path(args.table), table(parts))
-    say(args, f"{len(cases)} case{'s' * (len(cases) > 1)}, {args.runs} runs of {result['samples']} samples each, in {took:.1f} s")
+    there = f"; {kept.found} runs were there already" if kept and kept.found else ""
+    say(args, f"{len(cases)} case{'s' * (len(cases) > 1)}, {args.runs} runs of {result['samples']} samples each, in {took:.1f} s{there}")
     for line in [*describe(result), *notes]:
         say(args, line)
     emit(args, result)

@@ -190,7 +190,9 @@ def test_a_killed_campaign_ends_with_the_files_of_one_that_was_not(cli: Cli, tmp
     there = len(list(folder.glob("*.json")))
     assert 2 <= there < len(list((tmp_path / "once" / "chunks").iterdir()))
     assert not (tmp_path / "killed" / "campaign.json").exists()
-    assert cli(*command, tmp_path / "killed").status == 0
+    resumed = cli(*(c for c in command if c != "-q"), tmp_path / "killed")
+    assert resumed.status == 0
+    assert "runs were there already" in resumed.out
     once = files(tmp_path / "once")
     assert set(once) == {"campaign.json", "results.parquet", "campaign.html", "false_alarms.png"}
     assert files(tmp_path / "killed") == once
@@ -237,6 +239,12 @@ def test_local_starts_a_cluster_of_its_own(models: Models) -> None:
     case = case_of(models, faults=[FAULT])
     with cluster.cluster("local", 2) as way:
         assert same(campaign([case], 8, way, size=2), campaign([case], 8))
+
+
+def test_a_worker_with_another_build_of_the_library_is_refused(models: Models) -> None:
+    case = case_of(models)
+    with pytest.raises(InputError, match="another build"):
+        chunk(replace(case, setup=replace(case.setup, build="another")), 0, 1)
 
 
 def test_a_cluster_that_is_not_there_is_one_clear_line(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from hullguard.core.library import library
 from hullguard.core.native import REST, RESULT, Batch, Native
 from hullguard.design.design import Design, finish
 from hullguard.design.store import Stored
+from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.schema import Model, Reference
 
@@ -135,6 +136,8 @@ class Case(Keyed):
 
 @lru_cache(maxsize=4)  # tables cost as much as many runs
 def _native(setup: Setup) -> tuple[Native, Design]:
+    if library(setup.real).digest != setup.build:
+        raise InputError("a worker has another build of the C library, and could get other results: copy the caller's build/lib there, or name its copy in HULLGUARD_LIB")
     design = finish(setup.model, setup.stored)
     return Native(library(setup.real), design.tables), design
 

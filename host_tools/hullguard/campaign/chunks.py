@@ -16,6 +16,7 @@ class Chunks:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self.found = 0  # runs that did not have to be made
         folder.mkdir(parents=True, exist_ok=True)
 
     def _path(self, case: Case, first: int, count: int) -> Path:
@@ -28,7 +29,10 @@ class Chunks:
             rows = {name: np.array(data[name], dtype=np.float64 if name in FLOATS else np.int64) for name in COLUMNS}
         except (OSError, ValueError, KeyError, TypeError, OverflowError):
             return None
-        return rows if all(r.shape == (count,) for r in rows.values()) else None
+        if any(r.shape != (count,) for r in rows.values()):
+            return None
+        self.found += count
+        return rows
 
     def put(self, case: Case, first: int, rows: Rows) -> None:
         """Keep the rows of a chunk: written beside its place, then moved there, so that a kill leaves no half of it."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from hullguard.campaign.case import Case, Rows
 from hullguard.model.table import Array
@@ -16,7 +16,7 @@ CONFIDENCE = 0.95
 
 def upper_bound(hits: int, runs: int) -> float:
     """Exact (Clopper and Pearson) one-sided upper confidence bound of a probability that showed in `hits` of `runs`."""
-    return 1.0 if hits >= runs else float(beta.ppf(CONFIDENCE, hits + 1, runs - hits))
+    return 1.0 if hits >= runs else float(betaincinv(hits + 1, runs - hits, CONFIDENCE))
 
 
 def summary(parts: Sequence[tuple[Case, Rows]]) -> dict[str, Any]:

@@ -67,4 +67,4 @@ def write_table(path: Path, made: dict[str, list[Any]]) -> None:
 
             pq.write_table(pa.table(made), path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); name another place") from error
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); name another place") from error
