@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -20,7 +21,12 @@ import numpy as np
 
 from hullguard.bus import candump, choose
 from hullguard.bus.link import opened
-from hullguard.campaign.campaign import Job, campaign, digest
+from hullguard.campaign import grid
+from hullguard.campaign.campaign import Way, campaign, processes
+from hullguard.campaign.case import Case, setup_of
+from hullguard.campaign.chunks import Chunks
+from hullguard.campaign.result import campaign_result, describe, write_results
+from hullguard.campaign.table import check_table, table, write_table
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native, Plant, Recording, Verdict
 from hullguard.design import store
@@ -472,46 +478,94 @@ def run_detect(args: argparse.Namespace) -> int:
 # ---- campaign, report ----
 
 
+def _campaign_designs(args: argparse.Namespace, keep: Path | None) -> list[tuple[dict[str, Any], Design]]:
+    """A design for every combination of what --vary names; searches are kept in a folder, where there is one."""
+    given = dict(parse_override(text) for text in args.set)
+    made = []
+    combinations = grid.combinations(args.vary)
+    if combinations == [{}]:
+        return [({}, prepared(args)[1])]
+    for i, varied in enumerate(combinations):
+        model = load_model(args.model, given | varied, args.scenario)
+        path = keep / f"{model.sha256[:24]}.design.toml" if keep else None
+        old = store.read(path) if path else None
+        say(args, f"design {i + 1} of {len(combinations)}: {', '.join(f'{k} = {v}' for k, v in varied.items())}" + (" (kept)" if old else ""))
+        with progress(args, f"designing {model.name}") as tick:
+            stored = old or stored_for(model, False, tick)[0]
+        if path and not old:
+            store.write(path, model.path.stem, stored)
+        made.append((varied, finish(model, stored)))
+    return made
+
+
+def _campaign_cases(args: argparse.Namespace, keep: Path | None) -> list[Case]:
+    """The grid that the options span."""
+    losses, bursts = grid.losses(args.loss), grid.bursts(args.loss_burst)
+    sizes = grid.sizes(args.size) if args.size else []
+    attack = grid.share("--attack", args.attack)
+    cases = []
+    for varied, made in _campaign_designs(args, keep):
+        scenario = made.model.scenario(args.scenario)
+        samples = args.samples or scenario.samples
+        faults = the_faults(args, made.model, scenario.faults, samples)
+        if attack and min((f.start for f in faults), default=1) < 1:
+            raise InputError("--attack aims at samples before the first fault: let it start at sample 1 or later")
+        base = Case(setup_of(made, args.real), samples, scenario.reference, (), args.seed, attack=attack, varied=tuple(varied.items()))
+        cases += [replace(base, faults=f, loss=p, burst=b) for f in grid.fault_sets(faults, args.each_fault, sizes) for p in losses for b in bursts]
+    return cases
+
+
+@contextlib.contextmanager
+def _way(args: argparse.Namespace) -> Iterator[Way]:
+    """Where the chunks are worked off."""
+    workers = args.workers or os.cpu_count() or 1
+    if args.scheduler:
+        from hullguard.campaign.cluster import cluster
+
+        with cluster(args.scheduler, workers) as way:
+            yield way
+    else:
+        yield processes(workers)
+
+
 def run_campaign(args: argparse.Namespace) -> int:
     """`hullguard campaign`."""
-    if not 0.0 <= args.loss < 1.0:
-        raise InputError(f"--loss {args.loss:g}: expected a probability from 0 to below 1")
     if args.runs < 1:
         raise InputError(f"--runs {args.runs}: expected at least 1")
-    model, made = prepared(args)
-    scenario = model.scenario(args.scenario)
-    samples = args.samples or scenario.samples
-    faults = the_faults(args, model, scenario.faults, samples)
-    job = Job(made.model, made.stored, args.real, samples, scenario.reference, tuple(faults), args.seed, args.loss, REST)
+    if args.table:
+        check_table(Path(args.table))
+    out = Path(args.out) if args.out else None
+    if out is not None:
+        make_folder(out / "designs")
+    cases = _campaign_cases(args, out / "designs" if out else None)
+    kept = Chunks(out / "chunks") if out else None
     began = time.monotonic()
-    with progress(args, "campaign") as tick:
-        done = [0]
+    with progress(args, "campaign") as tick, _way(args) as way:
+        done = [0] * len(cases)
 
-        def more(count: int) -> None:
-            done[0] += count
-            tick("runs", done[0], args.runs)
+        def more(place: int, count: int) -> None:
+            done[place] += count
+            tick("runs", sum(done), args.runs * len(cases))
 
-        rows = campaign(job, args.runs, args.workers or os.cpu_count() or 1, more)
-    groups = sum(1 for g in model.groups if not g.closing)
-    result = {
-        "model": model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "scenario": scenario.name, "seed": args.seed, "loss": args.loss,
-        **digest(rows, samples, groups, faults),
-        "rows": rows,
-    }  # fmt: skip
-    false, provisional = result["false_alarm_runs"], result["provisional_alarm_runs"]
-    say(args, f"{args.runs} runs of {samples} samples in {time.monotonic() - began:.1f} s; measurement frames {100 * result['measurement_share']:.1f} % of periodic")
-    say(args, f"runs with a false alarm: {provisional} provisional, {false} confirmed; largest |r|/J before a fault {result['margin_max']:.3f}")
-    if faults:
-        delay = "never" if result["delay_mean"] is None else f"mean delay {result['delay_mean']:.2f} samples, longest {result['delay_max']}"
-        say(args, f"{', '.join(str(f) for f in faults)}: found in {result['detected_runs']} of {args.runs} runs, {delay}")
-    if args.out:
-        out = Path(args.out)
-        make_folder(out)
-        (out / "campaign.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        parts = list(zip(cases, campaign(cases, args.runs, way, more, kept), strict=True))
+    result = campaign_result(parts, args.scenario)
+    took = time.monotonic() - began
+    notes = write_results(out, parts, result) if out else []
+    if args.table:
+        write_table(Path(args.table), table(parts))
+    there = f"; {kept.found} runs were there already" if kept and kept.found else ""
+    say(args, f"{len(cases)} case{'s' * (len(cases) > 1)}, {args.runs} runs of {result['samples']} samples each, in {took:.1f} s{there}")
+    for line in [*describe(result), *notes]:
+        say(args, line)
     emit(args, result)
-    if args.expect == "quiet" and (provisional or (faults and result["detected_runs"])):
+    return _campaign_expected(args, result)
+
+
+def _campaign_expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
+    provisional, faulty = result["provisional_alarm_runs"], "faults" in result
+    if args.expect == "quiet" and (provisional or (faulty and result["detected_runs"])):
         raise ExpectationError(f"expected quiet runs: {provisional} had an alarm before any fault")
-    if args.expect == "detect" and (not faults or result["confirmed_runs"] < args.runs or provisional):
+    if args.expect == "detect" and (not faulty or result["confirmed_runs"] < result["runs"] or provisional):
         raise ExpectationError("expected every run to find its fault, and none to alarm before")
     return 0
 
@@ -563,7 +617,12 @@ def run_report(args: argparse.Namespace) -> int:
     """`hullguard report`."""
     directory = Path(args.directory)
     if not directory.is_dir():
-        raise InputError(f"{directory}: no such folder; give the --out folder of a run")
+        raise InputError(f"{directory}: no such folder; give the --out folder of a run or campaign")
+    if (directory / "campaign.json").is_file():
+        from hullguard.report.campaign_report import write_campaign_report
+
+        say(args, f"report: {write_campaign_report(directory)}")
+        return 0
     _report(args, directory)
     if args.png:
         from hullguard.report.run_report import write_picture

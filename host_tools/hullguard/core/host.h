@@ -114,6 +114,7 @@ typedef struct {
     int64_t                 samples;
     double                  sample_time_s;
     double                  loss;         /* probability that a measurement frame is lost at the receiver */
+    int64_t                 burst;        /* samples within which a loss takes all further frames of its group too; 0, 1: none */
     uint64_t                seed;
     int32_t                 start;        /* hg_start */
 } hgh_run_config;
@@ -123,6 +124,7 @@ typedef struct {
     int64_t closing;          /* closing frames */
     int64_t verdicts;         /* verdict and status frames */
     int64_t lost;             /* measurement frames dropped on purpose */
+    int64_t silent;           /* samples in the silent phase of an event group: 1 .. silence after its frame */
     int64_t bits;             /* of all frames sent, exact */
     int64_t measurement_bits;
     int64_t provisional_at;   /* first sample at or after the fault with at least a provisional alarm, -1 for never */
@@ -132,7 +134,8 @@ typedef struct {
     int64_t interval_min;     /* of event groups, samples; 0 without one */
     int64_t interval_max;
     double  margin;           /* largest |r| / J before the fault */
-    double  margin_after;     /* and from it on */
+    double  margin_settled;   /* the same from the sample on in which even a moving start would be over: the initial state has no part in it */
+    double  margin_after;     /* and from the fault on */
     uint32_t candidates;      /* at the first alarm after the fault */
     int32_t  plant;           /* last state */
 } hgh_result;
@@ -149,14 +152,17 @@ const hgh_result *hgh_run_result(const hgh_run *self);
 /** Put other faults in place from here on, and forget what was found so far. */
 void hgh_run_inject(hgh_run *self, const hgh_fault *fault, int32_t count);
 
-/* What the last step saw: [signals] readings; [width] held and derived values, and radii; [residuals] r and J. */
+/* What the last step saw: [signals] readings; [width] held and derived values, and radii; [signals] what the silent sender promised: the reading
+ * is at most that far from the one it sent last (signal units), infinite where it sent or did not look; [residuals] r and J. */
 typedef struct {
     const double *reading;
     const double *value;
     const double *radius;
+    const double *promise;
     const double *r;
     const double *J;
     uint32_t      events; /* bit g: group g sent */
+    uint32_t      lost;   /* bit g: and the frame was dropped */
     int32_t       plant;
     uint16_t      bus;
     int64_t       bits;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from functools import cache
@@ -33,7 +34,7 @@ def _declarations(text: str) -> str:
 
 
 class Library:
-    """One loaded build: `ffi` and `lib` as cffi has them, `real` is f32 or f64."""
+    """One loaded build: `ffi` and `lib` as cffi has them, `real` is f32 or f64, `digest` tells it from other builds."""
 
     def __init__(self, real: str, folder: Path) -> None:
         self.real = real
@@ -43,6 +44,7 @@ class Library:
             raise InputError(f"the C library is not built ({shared.name} is missing); run: make lib")
         self.ffi.cdef(_declarations(header.read_text(encoding="utf-8")))
         self.lib: Any = self.ffi.dlopen(str(shared))
+        self.digest = hashlib.sha256(shared.read_bytes()).hexdigest()
 
 
 @cache

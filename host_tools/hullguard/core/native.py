@@ -441,13 +441,16 @@ class Recording:
 
 
 RESULT = (
-    *("measurement", "closing", "verdicts", "lost", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
-    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_after", "candidates", "plant"),
+    *("measurement", "closing", "verdicts", "lost", "silent", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
+    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_settled", "margin_after", "candidates", "plant"),
 )
 
 
 class Batch:
-    """Runs of one configuration in C: plant or recording, senders, losses, detector node, all in one process."""
+    """Runs of one configuration in C: plant or recording, senders, losses, detector node, all in one process.
+
+    Arrays of doubles (series, disturbance, initial) are read where they lie: what is written into them counts from the next run on.
+    """
 
     def __init__(
         self,
@@ -459,6 +462,7 @@ class Batch:
         seed: int = 1,
         loss: float = 0.0,
         start: int = REST,
+        burst: int = 0,
         series: Array | None = None,
         noise: bool = False,
         disturbance: Array | None = None,
@@ -493,7 +497,7 @@ class Batch:
             c.initial = doubles(initial)
         c.reference, c.fault, c.faults = reference_of(native.library, reference), self._keep[1], len(faults)
         c.signals, c.samples, c.sample_time_s = len(model.signals), samples, model.sample_time_s
-        c.loss, c.seed, c.start = loss, seed, start
+        c.loss, c.burst, c.seed, c.start = loss, burst, seed, start
         self.config = c
 
     def runs(self, first: int, count: int) -> list[dict[str, Any]]:
@@ -505,23 +509,21 @@ class Batch:
         return [{name: getattr(results[i], name) for name in RESULT} | {"run": first + i} for i in range(count)]
 
     def trace(self, run: int = 0) -> dict[str, Array]:
-        """One run sample by sample: reading (samples x signals), value, radius (samples x width), r, J (samples x residuals), events, plant, bus, bits."""
+        """One run sample by sample: reading, promise (samples x signals), value, radius (samples x width), r, J (samples x residuals), events, lost, plant, bus, bits."""
         lib, ffi, t = self._native.library.lib, self._native.library.ffi, self._native.tables
+        lengths = dict.fromkeys(("reading", "promise"), t.signals) | dict.fromkeys(("value", "radius"), t.width) | dict.fromkeys(("r", "J"), t.residuals)
         made = lib.hgh_run_new(self.config, run)
         if made == ffi.NULL:
             raise InputError(f"model {self._model.name}: the emulator refused the configuration")
-        rows: dict[str, list[Any]] = {name: [] for name in ("reading", "value", "radius", "r", "J", "events", "plant", "bus", "bits")}
+        rows: dict[str, list[Any]] = {name: [] for name in (*lengths, "events", "lost", "plant", "bus", "bits")}
         try:
             more = True
             while more:
                 more = lib.hgh_run_steps(made, 1)
                 view = lib.hgh_run_view(made)
-                rows["reading"].append(ffi.unpack(view.reading, t.signals))
-                for name in ("value", "radius"):
-                    rows[name].append(ffi.unpack(getattr(view, name), t.width))
-                for name in ("r", "J"):
-                    rows[name].append(ffi.unpack(getattr(view, name), t.residuals))
-                for name in ("events", "plant", "bus", "bits"):
+                for name, length in lengths.items():
+                    rows[name].append(ffi.unpack(getattr(view, name), length))
+                for name in ("events", "lost", "plant", "bus", "bits"):
                     rows[name].append(getattr(view, name))
         finally:
             lib.hgh_run_free(made)

@@ -13,13 +13,16 @@ struct hgh_run {
     hgh_result     result;
     int64_t        k;
     int64_t        fault_start;
+    int64_t        settled; /* first sample in which the initial state does not matter */
     int64_t        last_event[HG_GROUPS_MAX];
-    uint32_t       events;
+    int64_t        lost_until[HG_GROUPS_MAX];
+    uint32_t       events, lost;
     int64_t        bits; /* of the last sample */
     hg_verdict     verdict;
     hg_node        node;
     hg_sender      sender[HG_GROUPS_MAX];
-    double         reading[HGH_SIGNALS_MAX], value[UINT8_MAX], radius[UINT8_MAX]; /* the last two of the whole signal vector */
+    double         reading[HGH_SIGNALS_MAX], promise[HGH_SIGNALS_MAX];
+    double         value[UINT8_MAX], radius[UINT8_MAX]; /* of the whole signal vector */
     double        *r, *J;
 };
 
@@ -66,6 +69,15 @@ static int64_t first_fault(const hgh_fault *fault, int32_t count)
         first = (fault[i].start < first) ? fault[i].start : first;
     }
     return first;
+}
+
+static int64_t settling(const hg_detector_config *d)
+{
+    int64_t longest = 0;
+    for (uint8_t g = 0U; g < d->generators; g++) {
+        longest = (d->hull[g].ready_moving > longest) ? d->hull[g].ready_moving : longest;
+    }
+    return longest;
 }
 
 static void forget(hgh_run *self)
@@ -119,6 +131,7 @@ hgh_run *hgh_run_new(const hgh_run_config *config, uint64_t run)
     hgh_random_start(&self->noise, config->seed, run, 4U);
     hgh_random_start(&self->loss, config->seed, run, 5U);
     self->fault_start = first_fault(config->fault, config->faults);
+    self->settled = settling(d);
     forget(self);
     return self;
 }
@@ -170,6 +183,20 @@ static void count_event(hgh_run *self, uint8_t group)
     result->measurement++;
 }
 
+/* Does the receiver miss this measurement frame? */
+static bool dropped(hgh_run *self, uint8_t group)
+{
+    if (self->config.loss <= 0.0) {
+        return false;
+    }
+    const bool begins = hgh_random_unit(&self->loss) < self->config.loss;
+    if (self->k < self->lost_until[group]) {
+        return true;
+    }
+    self->lost_until[group] = begins ? self->k + self->config.burst : 0;
+    return begins;
+}
+
 static void speak(hgh_run *self, uint8_t group, const double *reading)
 {
     hg_real value[HG_GROUP_SIGNALS_MAX];
@@ -190,11 +217,23 @@ static void speak(hgh_run *self, uint8_t group, const double *reading)
         count_event(self, group);
         self->result.measurement_bits += bits;
     }
-    if (!closing && (self->config.loss > 0.0) && (hgh_random_unit(&self->loss) < self->config.loss)) {
+    if (!closing && dropped(self, group)) {
+        self->lost |= 1U << group;
         self->result.lost++;
     } else {
         (void)hg_node_receive(&self->node, &frame);
     }
+}
+
+/* Does a sender not look at this sample, because it has just spoken? */
+static bool silent_phase(const hgh_run *self)
+{
+    bool silent = false;
+    for (uint8_t g = 0U; g < self->config.node->detector->groups; g++) {
+        const hg_trigger *t = &self->sender[g].trigger;
+        silent = silent || ((t->age >= 1U) && (t->age <= t->config->silence[t->level]));
+    }
+    return silent;
 }
 
 static double largest_ratio(const hgh_run *self)
@@ -212,6 +251,7 @@ static void judge(hgh_run *self, const hg_verdict *verdict)
     const double ratio = largest_ratio(self);
     if (self->k < self->fault_start) {
         result->margin = fmax(result->margin, ratio);
+        result->margin_settled = (self->k >= self->settled) ? fmax(result->margin_settled, ratio) : 0.0;
         result->false_provisional += ((verdict->plant >= HG_PLANT_PROVISIONAL) && (self->verdict.plant < HG_PLANT_PROVISIONAL)) ? 1 : 0;
         result->false_confirmed += ((verdict->plant == HG_PLANT_CONFIRMED) && (self->verdict.plant != HG_PLANT_CONFIRMED)) ? 1 : 0;
     } else {
@@ -234,6 +274,7 @@ static void step(hgh_run *self)
     hg_verdict verdict;
     hg_can_frame frame[2];
     self->events = 0U;
+    self->lost = 0U;
     self->bits = 0;
     read_signals(self);
     const double *reading = self->reading;
@@ -248,6 +289,7 @@ static void step(hgh_run *self)
         reading += self->config.sender[g].trigger->width;
     }
     speak(self, node->closing, reading);
+    self->result.silent += silent_phase(self) ? 1 : 0;
     while (hg_node_step(&self->node, &verdict) == HG_OK) {
         const uint8_t frames = hg_node_report(&self->node, &verdict, false, frame);
         for (uint8_t i = 0U; i < frames; i++) {
@@ -276,6 +318,20 @@ const hgh_result *hgh_run_result(const hgh_run *self)
     return &self->result;
 }
 
+static void promises(hgh_run *self)
+{
+    double *promise = self->promise;
+    for (uint8_t g = 0U; g < self->config.node->detector->groups; g++) {
+        const hg_trigger *t = &self->sender[g].trigger;
+        const hg_code_scale *scale = self->config.sender[g].message->scale;
+        const bool looked = t->age > t->config->silence[t->level];
+        for (uint8_t i = 0U; i < t->config->width; i++) {
+            promise[i] = looked ? ((double)hg_trigger_threshold(t->config, t->level, i, t->sent[i]) + 0.5) * (double)scale[i].resolution : (double)INFINITY;
+        }
+        promise += t->config->width;
+    }
+}
+
 hgh_view hgh_run_view(hgh_run *self)
 {
     const hg_detector *d = &self->node.detector;
@@ -287,12 +343,15 @@ hgh_view hgh_run_view(hgh_run *self)
         self->r[i] = (double)d->r[i];
         self->J[i] = (double)d->J[i];
     }
+    promises(self);
     return (hgh_view){.reading = self->reading,
                       .value = self->value,
                       .radius = self->radius,
+                      .promise = self->promise,
                       .r = self->r,
                       .J = self->J,
                       .events = self->events,
+                      .lost = self->lost,
                       .plant = (int32_t)self->verdict.plant,
                       .bus = self->verdict.bus,
                       .bits = self->bits};
