@@ -53,7 +53,7 @@ def prepared(args: argparse.Namespace) -> tuple[Model, Design]:
     overrides = dict(parse_override(text) for text in args.set)
     model = load_model(args.model, overrides, getattr(args, "scenario", None))
     with progress(args, f"designing {model.name}") as tick:
-        made, own = design(model, fresh=False, tick=tick)
+        made, own = design(model, fresh=False, tick=tick, workers=os.cpu_count() or 1)
     if not own and not overrides and not model.scenario(getattr(args, "scenario", None)).set and store.read(store.path_of(model.path)) is None:
         _keep_design(args, model, made)
     return made.model, made
@@ -142,7 +142,7 @@ def run_design(args: argparse.Namespace) -> int:
     overrides = dict(parse_override(text) for text in args.set)
     model = load_model(args.model, overrides)
     with progress(args, f"designing {model.name}") as tick:
-        stored, own = stored_for(model, args.fresh, tick)
+        stored, own = stored_for(model, args.fresh, tick, os.cpu_count() or 1)
     made = finish(model, stored)
     out = Path(args.out) if args.out else Path("build") / model.name
     make_folder(out)

@@ -10,7 +10,13 @@ import hypothesis.core
 import pytest
 from host_support import ROOT, SEED, Cli, Models
 
-hypothesis.settings.register_profile("hullguard", deadline=None, database=None, print_blob=True, suppress_health_check=list(hypothesis.HealthCheck))
+hypothesis.settings.register_profile(
+    "hullguard",
+    deadline=None,
+    database=None,
+    print_blob=True,
+    suppress_health_check=list(hypothesis.HealthCheck),
+)
 hypothesis.settings.load_profile("hullguard")
 
 
@@ -19,7 +25,9 @@ def pytest_configure(config: pytest.Config) -> None:
         hypothesis.core.global_force_seed = SEED
     # Commands that are run as processes find the package where the tests do.
     path = os.environ.get("PYTHONPATH", "")
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT / "host_tools"), *([path] if path else [])])
+    os.environ["PYTHONPATH"] = os.pathsep.join(
+        [str(ROOT / "host_tools"), *([path] if path else [])]
+    )
 
 
 def pytest_report_header() -> str:

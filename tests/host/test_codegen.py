@@ -33,8 +33,25 @@ from hullguard.model.schema import load_model
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = ROOT / "firmware" / "models"
 SOURCES = sorted((ROOT / "firmware" / "src").glob("*.c"))
-WARNINGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wfloat-equal"]
-WARNINGS += ["-Wstrict-prototypes", "-Wmissing-prototypes", "-Wshadow", "-Wcast-align", "-Wvla", "-Wundef", "-Wswitch-enum"]
+WARNINGS = [
+    "-std=c11",
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wsign-conversion",
+    "-Wdouble-promotion",
+    "-Wfloat-equal",
+]
+WARNINGS += [
+    "-Wstrict-prototypes",
+    "-Wmissing-prototypes",
+    "-Wshadow",
+    "-Wcast-align",
+    "-Wvla",
+    "-Wundef",
+    "-Wswitch-enum",
+]
 WARNINGS += ["-ffp-contract=off", "-Werror"]
 COMPILERS = [c for c in ("gcc", "clang-19") if shutil.which(c)]
 REALS = ("f32", "f64")
@@ -304,10 +321,30 @@ def changed_places(d: Design) -> Design:
     a, b, c = first.signals
     signals = (
         replace(a, start=23, length=17, flags=MOTOROLA | SIGNED),
-        replace(b, start=38, length=15, flags=MOTOROLA, offset=-16.0, minimum=0, maximum=32000, zero=16000),
-        replace(c, start=48, length=16, flags=0, offset=-20.0, minimum=0, maximum=40000, zero=20000),
+        replace(
+            b,
+            start=38,
+            length=15,
+            flags=MOTOROLA,
+            offset=-16.0,
+            minimum=0,
+            maximum=32000,
+            zero=16000,
+        ),
+        replace(
+            c,
+            start=48,
+            length=16,
+            flags=0,
+            offset=-20.0,
+            minimum=0,
+            maximum=40000,
+            zero=20000,
+        ),
     )
-    return replace(d, tables=replace(d.tables, groups=(replace(first, signals=signals), *rest)))
+    return replace(
+        d, tables=replace(d.tables, groups=(replace(first, signals=signals), *rest))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -316,7 +353,11 @@ def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
     path = tmp_path_factory.mktemp("models") / "tank.toml"
     path.write_text(TANK, encoding="utf-8")
     platoon = design(load_model("platoon"))[0]
-    return {"platoon": platoon, "tank": design(load_model(str(path)))[0], "places": changed_places(platoon)}
+    return {
+        "platoon": platoon,
+        "tank": design(load_model(str(path)))[0],
+        "places": changed_places(platoon),
+    }
 
 
 NAMES = ("platoon", "tank", "places")
@@ -332,15 +373,29 @@ class Built:
 
     def run(self, program: str, *arguments: str, given: str = "") -> list[str]:
         """Lines that a program prints."""
-        done = subprocess.run([self.dir / program, *arguments], input=given, capture_output=True, text=True, check=True, timeout=60)
+        done = subprocess.run(
+            [self.dir / program, *arguments],
+            input=given,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=60,
+        )
         return done.stdout.splitlines()
 
 
 def definitions(name: str) -> list[str]:
     """How a probe is told the model's names."""
-    parts = {"MODEL_HEADER": f'"{name}.h"', "CONFIG": f"hg_{name}_config", "SENDER": f"hg_{name}_sender"}
+    parts = {
+        "MODEL_HEADER": f'"{name}.h"',
+        "CONFIG": f"hg_{name}_config",
+        "SENDER": f"hg_{name}_sender",
+    }
     parts |= {"NODE": f"hg_{name}_node", "SENDERS": f"hg_{name}_senders"}
-    parts |= {"START_NODE": f"hg_{name}_node_start", "START_SENDERS": f"hg_{name}_senders_start"}
+    parts |= {
+        "START_NODE": f"hg_{name}_node_start",
+        "START_SENDERS": f"hg_{name}_senders_start",
+    }
     return [f"-D{key}={value}" for key, value in parts.items()]
 
 
@@ -350,14 +405,28 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Path]]:
     made: dict[str, list[Path]] = {}
     for r in REALS:
         out = tmp_path_factory.mktemp(f"library_{r}")
-        command = ["gcc", *WARNINGS, "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", f"-DHG_REAL_{r.upper()}=1", f"-I{ROOT}/firmware/include", "-c"]
+        command = [
+            "gcc",
+            *WARNINGS,
+            "-O1",
+            "-fsanitize=undefined",
+            "-fno-sanitize-recover=all",
+            f"-DHG_REAL_{r.upper()}=1",
+            f"-I{ROOT}/firmware/include",
+            "-c",
+        ]
         subprocess.run([*command, *map(str, SOURCES)], cwd=out, check=True)
         made[r] = sorted(out.glob("*.o"))
     return made
 
 
 @pytest.fixture(scope="module", params=NAMES)
-def built(request: pytest.FixtureRequest, designs: dict[str, Design], objects: dict[str, list[Path]], tmp_path_factory: pytest.TempPathFactory) -> Built:
+def built(
+    request: pytest.FixtureRequest,
+    designs: dict[str, Design],
+    objects: dict[str, list[Path]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Built:
     """A model's generated files, compiled and linked with the library under every warning."""
     d, name = designs[request.param], designs[request.param].tables.name
     out = tmp_path_factory.mktemp(request.param)
@@ -365,10 +434,26 @@ def built(request: pytest.FixtureRequest, designs: dict[str, Design], objects: d
     for program, text in (("probe", PROBE), ("report", REPORT)):
         (out / f"{program}.c").write_text(text, encoding="ascii")
         for r in REALS:
-            command = ["gcc", *WARNINGS, "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", f"-DHG_REAL_{r.upper()}=1", *definitions(name)]
-            command += [f"-I{ROOT}/firmware/include", f"-I{out}", str(out / f"{program}.c"), str(out / f"{name}.c"), *map(str, objects[r])]
+            command = [
+                "gcc",
+                *WARNINGS,
+                "-O1",
+                "-fsanitize=undefined",
+                "-fno-sanitize-recover=all",
+                f"-DHG_REAL_{r.upper()}=1",
+                *definitions(name),
+            ]
+            command += [
+                f"-I{ROOT}/firmware/include",
+                f"-I{out}",
+                str(out / f"{program}.c"),
+                str(out / f"{name}.c"),
+                *map(str, objects[r]),
+            ]
             subprocess.run([*command, "-o", str(out / f"{program}_{r}")], check=True)
-    database = cantools.database.load_string((out / f"{name}.dbc").read_text(encoding="ascii"), "dbc", strict=True)
+    database = cantools.database.load_string(
+        (out / f"{name}.dbc").read_text(encoding="ascii"), "dbc", strict=True
+    )
     assert isinstance(database, Database)
     return Built(d, out, database)
 
@@ -377,33 +462,51 @@ def built(request: pytest.FixtureRequest, designs: dict[str, Design], objects: d
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_same_design_gives_the_same_bytes(designs: dict[str, Design], name: str) -> None:
+def test_the_same_design_gives_the_same_bytes(
+    designs: dict[str, Design], name: str
+) -> None:
     again = design(load_model("platoon"))[0] if name == "platoon" else designs[name]
     assert emit_c(designs[name]) == emit_c(again)
     assert emit_dbc(designs[name]) == emit_dbc(again)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_text_is_plain_and_says_where_it_comes_from(designs: dict[str, Design], name: str) -> None:
+def test_text_is_plain_and_says_where_it_comes_from(
+    designs: dict[str, Design], name: str
+) -> None:
     d = designs[name]
     for text in (*emit_c(d), emit_dbc(d)):
         assert text.isascii() and text.endswith("\n")
-        assert d.model.sha256 in text and f"0x{d.tables.hash:08X}" in text and f"{d.tables.name}.design.toml" in text
+        assert (
+            d.model.sha256 in text
+            and f"0x{d.tables.hash:08X}" in text
+            and f"{d.tables.name}.design.toml" in text
+        )
         assert "do not edit" in text
-        assert str(ROOT) not in text and "/" + "tmp" not in text and not re.search(r"20\d\d-\d\d", text)
+        assert (
+            str(ROOT) not in text
+            and "/" + "tmp" not in text
+            and not re.search(r"20\d\d-\d\d", text)
+        )
     for text in emit_c(d):
         assert max(map(len, text.splitlines())) <= 140
         assert not re.search(r"[ \t]$", text, re.MULTILINE)
 
 
-def test_shipped_files_are_those_of_the_shipped_model(designs: dict[str, Design]) -> None:
+def test_shipped_files_are_those_of_the_shipped_model(
+    designs: dict[str, Design],
+) -> None:
     header, source = emit_c(designs["platoon"])
     assert (MODELS / "platoon.h").read_text(encoding="ascii") == header
     assert (MODELS / "platoon.c").read_text(encoding="ascii") == source
-    assert (MODELS / "platoon.dbc").read_text(encoding="ascii") == emit_dbc(designs["platoon"])
+    assert (MODELS / "platoon.dbc").read_text(encoding="ascii") == emit_dbc(
+        designs["platoon"]
+    )
 
 
-def test_files_are_written_only_when_they_change(designs: dict[str, Design], tmp_path: Path) -> None:
+def test_files_are_written_only_when_they_change(
+    designs: dict[str, Design], tmp_path: Path
+) -> None:
     d = designs["tank"]
     assert [p.name for p in write_all(d, tmp_path)] == ["tank.h", "tank.c", "tank.dbc"]
     before = {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
@@ -414,7 +517,15 @@ def test_files_are_written_only_when_they_change(designs: dict[str, Design], tmp
 
 
 def test_literals_are_exact() -> None:
-    for x in (0.0, -0.0, 1.0, -1.5, float(np.float32(0.1)), float(np.float32(1e-45)), float(np.finfo(np.float32).max)):
+    for x in (
+        0.0,
+        -0.0,
+        1.0,
+        -1.5,
+        float(np.float32(0.1)),
+        float(np.float32(1e-45)),
+        float(np.finfo(np.float32).max),
+    ):
         literal = real(x)
         inner = literal.removeprefix("HG_REAL_C(").removesuffix(")")
         assert float.fromhex(inner).hex() == x.hex()
@@ -426,12 +537,22 @@ def test_literals_are_exact() -> None:
 def test_long_rows_are_spread_evenly() -> None:
     lines = fill([f"HG_REAL_C(0x1.{i:06x}p-10)" for i in range(13)])
     assert max(map(len, lines)) <= 140
-    assert {line.count("HG_REAL_C") for line in lines[:-1]} == {lines[0].count("HG_REAL_C")}
+    assert {line.count("HG_REAL_C") for line in lines[:-1]} == {
+        lines[0].count("HG_REAL_C")
+    }
     assert sum(line.count("HG_REAL_C") for line in lines) == 13
 
 
-@pytest.mark.parametrize(("group", "message"), [("Status", "the detector's own frame"), ("Measure-ment", "'Measure-ment' have the same identifier")])
-def test_names_that_would_collide_are_refused(designs: dict[str, Design], group: str, message: str) -> None:
+@pytest.mark.parametrize(
+    ("group", "message"),
+    [
+        ("Status", "the detector's own frame"),
+        ("Measure-ment", "'Measure-ment' have the same identifier"),
+    ],
+)
+def test_names_that_would_collide_are_refused(
+    designs: dict[str, Design], group: str, message: str
+) -> None:
     d = designs["platoon"]
     first, second = d.tables.groups
     both = (replace(first, name="measure ment"), replace(second, name=group))
@@ -445,7 +566,14 @@ def test_a_signal_named_like_a_constant_is_refused(designs: dict[str, Design]) -
     first, second = d.tables.groups
     signals = (replace(first.signals[0], name="group_control"), *first.signals[1:])
     with pytest.raises(InputError, match="HG_PLATOON_GROUP_CONTROL"):
-        emit_c(replace(d, tables=replace(d.tables, groups=(replace(first, signals=signals), second))))
+        emit_c(
+            replace(
+                d,
+                tables=replace(
+                    d.tables, groups=(replace(first, signals=signals), second)
+                ),
+            )
+        )
 
 
 # --- C ---------------------------------------------------------------------------------------------------------------------------------
@@ -454,26 +582,72 @@ def test_a_signal_named_like_a_constant_is_refused(designs: dict[str, Design]) -
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("number", REALS)
 @pytest.mark.parametrize("name", NAMES)
-def test_compiles_without_a_warning(designs: dict[str, Design], tmp_path: Path, name: str, number: str, compiler: str) -> None:
+def test_compiles_without_a_warning(
+    designs: dict[str, Design], tmp_path: Path, name: str, number: str, compiler: str
+) -> None:
     d = designs[name]
     write_all(d, tmp_path)
     model = d.tables.name
-    command = [compiler, *WARNINGS, f"-DHG_REAL_{number.upper()}=1", f"-I{ROOT}/firmware/include"]
-    subprocess.run([*command, "-c", str(tmp_path / f"{model}.c"), "-o", str(tmp_path / "out.o")], check=True)
+    command = [
+        compiler,
+        *WARNINGS,
+        f"-DHG_REAL_{number.upper()}=1",
+        f"-I{ROOT}/firmware/include",
+    ]
+    subprocess.run(
+        [*command, "-c", str(tmp_path / f"{model}.c"), "-o", str(tmp_path / "out.o")],
+        check=True,
+    )
 
 
 def test_header_is_cpp_too(designs: dict[str, Design], tmp_path: Path) -> None:
     write_all(designs["tank"], tmp_path)
-    (tmp_path / "use.cpp").write_text('#include "tank.h"\n#include "tank.h"\nhg_tank_node node;\nhg_tank_senders senders;\n', encoding="ascii")
-    subprocess.run(["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{ROOT}/firmware/include", "-fsyntax-only", str(tmp_path / "use.cpp")], check=True)
+    (tmp_path / "use.cpp").write_text(
+        '#include "tank.h"\n#include "tank.h"\nhg_tank_node node;\nhg_tank_senders senders;\n',
+        encoding="ascii",
+    )
+    subprocess.run(
+        [
+            "g++",
+            "-std=c++17",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            f"-I{ROOT}/firmware/include",
+            "-fsyntax-only",
+            str(tmp_path / "use.cpp"),
+        ],
+        check=True,
+    )
 
 
-@pytest.mark.parametrize(("limit", "least"), [("HG_GROUPS_MAX", 3), ("HG_GROUP_SIGNALS_MAX", 3), ("HG_LEVELS_MAX", 3), ("HG_GENERATORS_MAX", 2)])
-def test_too_small_a_limit_is_an_error_that_names_it(designs: dict[str, Design], tmp_path: Path, limit: str, least: int) -> None:
+@pytest.mark.parametrize(
+    ("limit", "least"),
+    [
+        ("HG_GROUPS_MAX", 3),
+        ("HG_GROUP_SIGNALS_MAX", 3),
+        ("HG_LEVELS_MAX", 3),
+        ("HG_GENERATORS_MAX", 2),
+    ],
+)
+def test_too_small_a_limit_is_an_error_that_names_it(
+    designs: dict[str, Design], tmp_path: Path, limit: str, least: int
+) -> None:
     write_all(designs["tank"], tmp_path)
-    command = ["gcc", "-std=c11", f"-I{ROOT}/firmware/include", "-fsyntax-only", str(tmp_path / "tank.c")]
+    command = [
+        "gcc",
+        "-std=c11",
+        f"-I{ROOT}/firmware/include",
+        "-fsyntax-only",
+        str(tmp_path / "tank.c"),
+    ]
     subprocess.run([*command, f"-D{limit}={least}U"], check=True)
-    failed = subprocess.run([*command, f"-D{limit}={least - 1}U"], capture_output=True, text=True, check=False)
+    failed = subprocess.run(
+        [*command, f"-D{limit}={least - 1}U"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert failed.returncode != 0
     assert f"model tank needs {limit} of at least {least}" in failed.stderr
 
@@ -490,19 +664,49 @@ def _each(tag: str, values: object) -> Numbers:
 
 
 def _message(m: MessageTable, signals: tuple[SignalTable, ...]) -> Numbers:
-    numbers = [p for key in ("id", "flags", "length") for p in _each(key, getattr(m, key))]
+    numbers = [
+        p for key in ("id", "flags", "length") for p in _each(key, getattr(m, key))
+    ]
     numbers += _each("width", len(signals)) + _each("data_id", m.data_id)
     for s in signals:
-        numbers += _each("start", s.start) + _each("bits", s.length) + _each("field_flags", s.flags)
-        numbers += [p for key in ("resolution", "offset", "per_unit", "minimum", "maximum") for p in _each(key, getattr(s, key))]
+        numbers += (
+            _each("start", s.start)
+            + _each("bits", s.length)
+            + _each("field_flags", s.flags)
+        )
+        numbers += [
+            p
+            for key in ("resolution", "offset", "per_unit", "minimum", "maximum")
+            for p in _each(key, getattr(s, key))
+        ]
     return numbers
 
 
 def _group(g: GroupTable) -> Numbers:
     numbers = _message(g.message, g.signals) + _each("sender", 1)
-    numbers += [p for key in ("levels", "interval_max", "margin", "silence", "delta", "sigma", "activity") for p in _each(key, getattr(g, key))]
-    numbers += _each("zero", tuple(s.zero for s in g.signals)) + _each("half", tuple(s.half for s in g.signals)) + _each("slew", g.slew)
-    return numbers + _each("span", tuple(s.span for s in g.signals)) + _each("middle", tuple(s.middle for s in g.signals))
+    numbers += [
+        p
+        for key in (
+            "levels",
+            "interval_max",
+            "margin",
+            "silence",
+            "delta",
+            "sigma",
+            "activity",
+        )
+        for p in _each(key, getattr(g, key))
+    ]
+    numbers += (
+        _each("zero", tuple(s.zero for s in g.signals))
+        + _each("half", tuple(s.half for s in g.signals))
+        + _each("slew", g.slew)
+    )
+    return (
+        numbers
+        + _each("span", tuple(s.span for s in g.signals))
+        + _each("middle", tuple(s.middle for s in g.signals))
+    )
 
 
 def expected_numbers(d: Design) -> Numbers:
@@ -513,19 +717,57 @@ def expected_numbers(d: Design) -> Numbers:
         numbers += _group(g)
     numbers += _each("generators", len(t.generators))
     for e in t.generators:
-        numbers += _each("order", len(e.state)) + _each("residuals", len(e.output)) + _each("width", len(e.signal)) + _each("signal", e.signal)
+        numbers += (
+            _each("order", len(e.state))
+            + _each("residuals", len(e.output))
+            + _each("width", len(e.signal))
+            + _each("signal", e.signal)
+        )
         for key in ("state", "input", "output", "direct"):
             m = getattr(e, key)
-            numbers += _each("rows", len(m)) + _each("cols", len(m[0])) + _each("exponent", 0) + _each(key, m)
+            numbers += (
+                _each("rows", len(m))
+                + _each("cols", len(m[0]))
+                + _each("exponent", 0)
+                + _each(key, m)
+            )
         numbers += _each("same", 1)
-        for key in ("taps", "weight", "settle", "rest", "moving", "ready_rest", "ready_moving", "decay", "tail_input", "tail_output"):
+        for key in (
+            "taps",
+            "weight",
+            "settle",
+            "rest",
+            "moving",
+            "ready_rest",
+            "ready_moving",
+            "decay",
+            "tail_input",
+            "tail_output",
+        ):
             numbers += _each(key, getattr(e, key))
     numbers += _each("decisions", len(t.generators))
-    numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each("faults", tuple(e.faults for e in t.generators))
-    numbers += _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("all_residuals", t.residuals)
-    numbers += _each("codes", 2 * t.signals) + [(tag, float(detector_reals(t))) for tag in ("reals", "needed", "stored")]
-    numbers += _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
-    return numbers + _each("heartbeat", t.heartbeat) + _each("hash", t.hash) + [("node", 1.0), ("null", 1.0), ("senders", 1.0), ("null", 1.0)]
+    numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each(
+        "faults", tuple(e.faults for e in t.generators)
+    )
+    numbers += (
+        _each("up", t.up)
+        + _each("down", t.down)
+        + _each("latch", int(t.latch))
+        + _each("history", t.history)
+        + _each("all_residuals", t.residuals)
+    )
+    numbers += _each("codes", 2 * t.signals) + [
+        (tag, float(detector_reals(t))) for tag in ("reals", "needed", "stored")
+    ]
+    numbers += (
+        _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
+    )
+    return (
+        numbers
+        + _each("heartbeat", t.heartbeat)
+        + _each("hash", t.hash)
+        + [("node", 1.0), ("null", 1.0), ("senders", 1.0), ("null", 1.0)]
+    )
 
 
 @pytest.mark.parametrize("number", REALS)
@@ -548,7 +790,9 @@ def _sent_value(s: SignalTable, code: int) -> float:
 
 
 def _by_id(database: Database, g: GroupTable) -> Message:
-    return database.get_message_by_frame_id(g.message.id, force_extended_id=bool(g.message.flags & EXTENDED))
+    return database.get_message_by_frame_id(
+        g.message.id, force_extended_id=bool(g.message.flags & EXTENDED)
+    )
 
 
 def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
@@ -558,41 +802,69 @@ def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
     for _ in range(200):
         for i, g in enumerate(tables.groups):
             ends = dice.random() < 0.1
-            codes = [dice.choice((s.minimum, s.maximum)) if ends else dice.randint(s.minimum, s.maximum) for s in g.signals]
+            codes = [
+                dice.choice((s.minimum, s.maximum))
+                if ends
+                else dice.randint(s.minimum, s.maximum)
+                for s in g.signals
+            ]
             asked.append((i, dice.randrange(16), dice.randrange(16), codes))
-    given = "".join(f"{i} {c} {k} {' '.join(map(str, codes))}\n" for i, c, k, codes in asked)
+    given = "".join(
+        f"{i} {c} {k} {' '.join(map(str, codes))}\n" for i, c, k, codes in asked
+    )
     answers = built.run("probe_f32", given=given)
     assert len(answers) == len(asked)
     for (i, counter, stamp, codes), answer in zip(asked, answers, strict=True):
         g, words = tables.groups[i], answer.split()
         data, message = bytes.fromhex(words[0]), _by_id(built.database, g)
         assert [int(w) for w in words[1 : 1 + len(codes)]] == codes
-        signals = {s.name: _sent_value(s, code) for s, code in zip(g.signals, codes, strict=True)}
-        header: dict[str, float] = {"E2E_CRC": data[0], "E2E_counter": counter, "E2E_stamp": stamp}
+        signals = {
+            s.name: _sent_value(s, code)
+            for s, code in zip(g.signals, codes, strict=True)
+        }
+        header: dict[str, float] = {
+            "E2E_CRC": data[0],
+            "E2E_counter": counter,
+            "E2E_stamp": stamp,
+        }
         assert message.encode({**header, **signals}, padding=False, strict=True) == data
         read = message.decode(data)
         assert isinstance(read, dict)
-        assert (read["E2E_CRC"], read["E2E_counter"], read["E2E_stamp"]) == (data[0], counter, stamp)
+        assert (read["E2E_CRC"], read["E2E_counter"], read["E2E_stamp"]) == (
+            data[0],
+            counter,
+            stamp,
+        )
         raw = message.decode(data, scaling=False)
         assert isinstance(raw, dict)
-        for s, code, value in zip(g.signals, codes, words[1 + len(codes) :], strict=True):
+        for s, code, value in zip(
+            g.signals, codes, words[1 + len(codes) :], strict=True
+        ):
             if not s.flags & FLOAT32:
                 assert raw[s.name] == code
             physical = read[s.name]
             assert isinstance(physical, (int, float))
-            assert abs(physical - float.fromhex(value)) <= 2.0**-22 * max(abs(physical), abs(s.offset), s.resolution)
+            assert abs(physical - float.fromhex(value)) <= 2.0**-22 * max(
+                abs(physical), abs(s.offset), s.resolution
+            )
             assert round((physical - s.offset) / s.resolution) == code
 
 
 def test_no_value_reads_as_invalid(built: Built) -> None:
     invalid = -(2**31)
     for i, g in enumerate(built.design.tables.groups):
-        answer = built.run("probe_f32", given=f"{i} 0 0 {' '.join([str(invalid)] * len(g.signals))}\n")[0]
+        answer = built.run(
+            "probe_f32", given=f"{i} 0 0 {' '.join([str(invalid)] * len(g.signals))}\n"
+        )[0]
         read = _by_id(built.database, g).decode(bytes.fromhex(answer.split()[0]))
         assert isinstance(read, dict)
         for s in g.signals:
             value = read[s.name]
-            assert np.isnan(float(str(value))) if s.flags & FLOAT32 else str(value) == "invalid"
+            assert (
+                np.isnan(float(str(value)))
+                if s.flags & FLOAT32
+                else str(value) == "invalid"
+            )
 
 
 def test_dbc_says_how_frames_are_sent(built: Built) -> None:
@@ -602,42 +874,82 @@ def test_dbc_says_how_frames_are_sent(built: Built) -> None:
         m = _by_id(built.database, g)
         assert m.dbc is not None
         assert (m.frame_id, m.length) == (g.message.id, g.message.length)
-        assert (m.is_extended_frame, m.is_fd) == (bool(g.message.flags & EXTENDED), bool(g.message.flags & FD))
+        assert (m.is_extended_frame, m.is_fd) == (
+            bool(g.message.flags & EXTENDED),
+            bool(g.message.flags & FD),
+        )
         assert m.send_type == ("Event" if g.interval_max > 1 else "Cyclic")
         assert m.cycle_time == round(g.interval_max * sample_ms)
         assert m.senders == [f"{m.name}_sender"]
         attributes = {key: a.value for key, a in m.dbc.attributes.items()}
         assert attributes["E2EProfile"] == 1
-        assert tuple(int(x, 16) for x in str(attributes["E2EDataIdList"]).split()) == g.message.data_id
-        assert attributes["VFrameFormat"] == (14 if g.message.flags & FD else 0) + (1 if g.message.flags & EXTENDED else 0)
+        assert (
+            tuple(int(x, 16) for x in str(attributes["E2EDataIdList"]).split())
+            == g.message.data_id
+        )
+        assert attributes["VFrameFormat"] == (14 if g.message.flags & FD else 0) + (
+            1 if g.message.flags & EXTENDED else 0
+        )
         assert ("closes the sample" in str(m.comment)) == (place == tables.closing)
         for s in g.signals:
             found = m.get_signal_by_name(s.name)
             assert found.conversion.is_float == bool(s.flags & FLOAT32)
-            assert found.byte_order == ("big_endian" if s.flags & MOTOROLA else "little_endian")
-            assert (found.start, found.length, found.unit) == (s.start, s.length, UNITS[s.name.rsplit("_", 1)[1]])
-            assert found.minimum == pytest.approx(s.offset + s.minimum * s.resolution, rel=1e-6)
-            assert found.maximum == pytest.approx(s.offset + s.maximum * s.resolution, rel=1e-6)
+            assert found.byte_order == (
+                "big_endian" if s.flags & MOTOROLA else "little_endian"
+            )
+            assert (found.start, found.length, found.unit) == (
+                s.start,
+                s.length,
+                UNITS[s.name.rsplit("_", 1)[1]],
+            )
+            assert found.minimum == pytest.approx(
+                s.offset + s.minimum * s.resolution, rel=1e-6
+            )
+            assert found.maximum == pytest.approx(
+                s.offset + s.maximum * s.resolution, rel=1e-6
+            )
             if not s.flags & FLOAT32:
                 assert found.is_signed == bool(s.flags & SIGNED)
-                assert np.float32(found.scale) == s.resolution and np.float32(found.offset) == s.offset
+                assert (
+                    np.float32(found.scale) == s.resolution
+                    and np.float32(found.offset) == s.offset
+                )
     nodes = {n.name for n in built.database.nodes}
-    assert nodes == {"detector", *(_by_id(built.database, g).senders[0] for g in tables.groups)}
+    assert nodes == {
+        "detector",
+        *(_by_id(built.database, g).senders[0] for g in tables.groups),
+    }
 
 
 def test_verdict_and_status_read_as_the_node_wrote_them(built: Built) -> None:
     database, tables = built.database, built.design.tables
     lines = [line.split() for line in built.run("report_f32")]
-    assert [int(i) for _, i in lines] == [tables.verdict.id, tables.status.id, tables.verdict.id]
-    first, status, reply = (database.decode_message(int(i), bytes.fromhex(data)) for data, i in lines)
-    assert isinstance(first, dict) and isinstance(status, dict) and isinstance(reply, dict)
+    assert [int(i) for _, i in lines] == [
+        tables.verdict.id,
+        tables.status.id,
+        tables.verdict.id,
+    ]
+    first, status, reply = (
+        database.decode_message(int(i), bytes.fromhex(data)) for data, i in lines
+    )
+    assert (
+        isinstance(first, dict) and isinstance(status, dict) and isinstance(reply, dict)
+    )
     verdict = database.get_message_by_frame_id(tables.verdict.id)
     faults = [s.name for s in verdict.signals if s.name.startswith("fault_")]
     buses = [s.name for s in verdict.signals if s.name.startswith("bus_")]
-    assert len(faults) == len(built.design.model.faults) and len(buses) == len(tables.groups)
-    assert str(first["plant"]) == "confirmed" and str(first["basis"]) == "set" and str(first["refused"]) == "yes"
+    assert len(faults) == len(built.design.model.faults) and len(buses) == len(
+        tables.groups
+    )
+    assert (
+        str(first["plant"]) == "confirmed"
+        and str(first["basis"]) == "set"
+        and str(first["refused"]) == "yes"
+    )
     assert [str(first[f]) for f in faults] == ["candidate"] + ["no"] * (len(faults) - 1)
-    assert [str(first[b]) for b in buses] == ["stale", "lossy", "good"][: len(buses)]  # 0x1B, two bits each
+    assert [str(first[b]) for b in buses] == ["stale", "lossy", "good"][
+        : len(buses)
+    ]  # 0x1B, two bits each
     assert int(str(first["sample_high"])) + int(str(first["E2E_stamp"])) == 0xABC
     assert (str(first["reply"]), str(reply["reply"])) == ("no", "yes")
     assert (first["E2E_counter"], reply["E2E_counter"]) == (0, 1)

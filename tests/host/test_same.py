@@ -24,24 +24,45 @@ from hullguard.core.native import (
 from hullguard.model import parse_fault
 from hullguard.plant.run import InProcess, Pace, Run, Trace
 
-FAULTS = ("controller2:bias:1.0@60", "gap12_m:freeze@100..120", "speed1_mps:noise:0.1@130", "controller1:gain:0.5@20..40", "gap23_m:drift:0.2@140")
+FAULTS = (
+    "controller2:bias:1.0@60",
+    "gap12_m:freeze@100..120",
+    "speed1_mps:noise:0.1@130",
+    "controller1:gain:0.5@20..40",
+    "gap23_m:drift:0.2@140",
+)
 
 
-def sample_by_sample(ready: Ready, samples: int, faults: tuple[str, ...], seed: int, pace: Pace) -> Trace:
-    source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in faults], seed)
+def sample_by_sample(
+    ready: Ready, samples: int, faults: tuple[str, ...], seed: int, pace: Pace
+) -> Trace:
+    source = Plant(
+        ready.native,
+        ready.design,
+        ready.reference,
+        [parse_fault(f) for f in faults],
+        seed,
+    )
     return Run(ready.design, ready.native, InProcess(), pace).samples(source, samples)
 
 
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("scenario", ["rest", "manoeuvres", "adaptive", "default"])
 @pytest.mark.parametrize("faults", [(), FAULTS], ids=["healthy", "faulty"])
-def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(models: Models, real: str, scenario: str, faults: tuple[str, ...]) -> None:
+def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(
+    models: Models, real: str, scenario: str, faults: tuple[str, ...]
+) -> None:
     ready = models.platoon(scenario, None, real)
     for seed, lockstep in ((SEED, False), (SEED + 1, True)):
-        slow, fast = sample_by_sample(ready, 160, faults, seed, Pace(lockstep, 1e9)), ready.batch(160, faults, seed).trace(0)
+        slow, fast = (
+            sample_by_sample(ready, 160, faults, seed, Pace(lockstep, 1e9)),
+            ready.batch(160, faults, seed).trace(0),
+        )
         for name in ("reading", "value", "radius", "r", "J"):
             assert np.array_equal(np.array(getattr(slow, name)), fast[name]), name
-        assert [PLANT_STATES.index(v.plant) for v in slow.verdict] == fast["plant"].tolist()
+        assert [PLANT_STATES.index(v.plant) for v in slow.verdict] == fast[
+            "plant"
+        ].tolist()
         assert [v.bus for v in slow.verdict] == [bus_of(int(b), 2) for b in fast["bus"]]
         assert [sum(1 << g for g in e) for e in slow.events] == fast["events"].tolist()
         if not lockstep:  # replies move the counter of the verdict frames, and with it their stuff bits
@@ -50,7 +71,10 @@ def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(models: Mod
 
 def test_another_seed_gives_another_run(models: Models) -> None:
     ready = models.platoon("manoeuvres")
-    assert not np.array_equal(ready.batch(50, (), SEED).trace(0)["reading"], ready.batch(50, (), SEED + 1).trace(0)["reading"])
+    assert not np.array_equal(
+        ready.batch(50, (), SEED).trace(0)["reading"],
+        ready.batch(50, (), SEED + 1).trace(0)["reading"],
+    )
 
 
 @pytest.mark.parametrize("real", REALS)
@@ -59,10 +83,15 @@ def test_batches_and_traces_of_one_run_agree(models: Models, real: str) -> None:
     batch = ready.batch(150, ("controller2:bias:1.5@60",))
     for run, row in enumerate(batch.runs(0, 5)):
         trace = batch.trace(run)
-        alarm = np.flatnonzero(trace["plant"][60:] >= PLANT_STATES.index("provisional")) + 60
+        alarm = (
+            np.flatnonzero(trace["plant"][60:] >= PLANT_STATES.index("provisional"))
+            + 60
+        )
         assert row["provisional_at"] == (alarm[0] if len(alarm) else -1)
         assert row["measurement"] == int((trace["events"] & 1).sum())
-        assert row["margin"] == pytest.approx(float((np.abs(trace["r"]) / trace["J"])[:60].max()), rel=1e-12)
+        assert row["margin"] == pytest.approx(
+            float((np.abs(trace["r"]) / trace["J"])[:60].max()), rel=1e-12
+        )
         assert row["bits"] == trace["bits"].sum()
 
 
@@ -78,35 +107,58 @@ const hg_sender_config *test_senders(void) { return hg_platoon_sender; }
 
 
 @pytest.fixture(scope="module", params=REALS)
-def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, models: Models) -> tuple[Ready, Library]:
+def generated(
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
+    models: Models,
+) -> tuple[Ready, Library]:
     """The platoon's generated C compiled into a library of its own, beside the structures that Python fills."""
     folder: Path = tmp_path_factory.mktemp(f"generated_{request.param}")
     ready = models.platoon("manoeuvres", None, request.param)
     header, source = emit_c(ready.design)
     (folder / "include").mkdir()
     (folder / "include" / "platoon.h").write_text(header, encoding="ascii")
-    lib = build_library(folder / "lib", request.param, extra=source + ACCESS, includes=("-I", str(folder / "include")))
-    lib.ffi.cdef("const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);")
+    lib = build_library(
+        folder / "lib",
+        request.param,
+        extra=source + ACCESS,
+        includes=("-I", str(folder / "include")),
+    )
+    lib.ffi.cdef(
+        "const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);"
+    )
     return ready, lib
 
 
 def generated_node(ready: Ready, lib: Library, start: int) -> Node:
-    native: Any = SimpleNamespace(library=lib, node=lib.lib.test_config(), tables=ready.native.tables)
+    native: Any = SimpleNamespace(
+        library=lib, node=lib.lib.test_config(), tables=ready.native.tables
+    )
     return Node(native, start)
 
 
 def generated_senders(ready: Ready, lib: Library) -> Sender:
-    native: Any = SimpleNamespace(library=lib, senders=lib.lib.test_senders(), tables=ready.native.tables)
+    native: Any = SimpleNamespace(
+        library=lib, senders=lib.lib.test_senders(), tables=ready.native.tables
+    )
     return Sender(native)
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(generated: tuple[Ready, Library], lockstep: bool, loss: float) -> None:
+def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(
+    generated: tuple[Ready, Library], lockstep: bool, loss: float
+) -> None:
     ready, lib = generated
     rng = np.random.default_rng(SEED)
     for start in (REST, 0):
-        source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in FAULTS], SEED)
+        source = Plant(
+            ready.native,
+            ready.design,
+            ready.reference,
+            [parse_fault(f) for f in FAULTS],
+            SEED,
+        )
         nodes = (Node(ready.native, start), generated_node(ready, lib, start))
         senders = (Sender(ready.native), generated_senders(ready, lib))
         answers = 0
@@ -139,16 +191,38 @@ def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(
 def test_the_committed_tables_are_those_of_the_design(models: Models) -> None:
     header, source = emit_c(models.design())
     folder = Path(__file__).resolve().parents[2] / "firmware" / "models"
-    assert (folder / "platoon.h").read_text(encoding="ascii") == header, "run: make models"
-    assert (folder / "platoon.c").read_text(encoding="ascii") == source, "run: make models"
+    assert (folder / "platoon.h").read_text(encoding="ascii") == header, (
+        "run: make models"
+    )
+    assert (folder / "platoon.c").read_text(encoding="ascii") == source, (
+        "run: make models"
+    )
 
 
 # ---- campaigns ----
 
 
 def test_a_campaign_is_the_batch_it_says_it_is(models: Models, cli: Cli) -> None:
-    rows = cli("campaign", "platoon", "--scenario", "manoeuvres", "--runs", 7, "--workers", 1, "--seed", 5, "--samples", 90, "--json", "-q").json["rows"]
-    assert rows == [r | {"attacked": 0} for r in models.platoon("manoeuvres").batch(90, seed=5).runs(0, 7)]
+    rows = cli(
+        "campaign",
+        "platoon",
+        "--scenario",
+        "manoeuvres",
+        "--runs",
+        7,
+        "--workers",
+        1,
+        "--seed",
+        5,
+        "--samples",
+        90,
+        "--json",
+        "-q",
+    ).json["rows"]
+    assert rows == [
+        r | {"attacked": 0}
+        for r in models.platoon("manoeuvres").batch(90, seed=5).runs(0, 7)
+    ]
 
 
 def test_native_structures_do_not_change_while_runs_use_them(models: Models) -> None:

@@ -24,6 +24,7 @@ from hullguard.model.schema import Model, Reference
 RUNS_TASK = 10
 PROVISIONAL = PLANT_STATES.index("provisional")
 WITH_FEEDBACK = "limit_feedback"
+EXCLUDING = "not "  # banks that exclude a hypothesis, which are not made to be early
 
 
 @dataclass(frozen=True)
@@ -73,10 +74,12 @@ class _Examiner:
             reference = self.emulator.reference(job.samples, job.reference, job.seed, run)
             found[WITH_FEEDBACK] = first_unexplained(self.knowing, trace, job.start, job.samples, reference=reference)
         found["detector"] = _first(np.asarray(trace["plant"] >= PROVISIONAL), job.start)
-        first = 0
-        for i, generator in enumerate(self.emulator.design.tables.generators):
-            own = slice(first, first + len(generator.output))
-            found[f"generator {i + 1}"] = _first(np.any(np.abs(trace["r"][:, own]) > trace["J"][:, own], axis=1), job.start)
+        first, design = 0, self.emulator.design
+        widths = [len(g.output) for g in design.tables.generators] + [1] * len(design.tables.banks)
+        for name, width in zip(design.judges, widths, strict=True):
+            own = slice(first, first + width)
+            if not name.startswith(EXCLUDING):
+                found[name] = _first(np.any(np.abs(trace["r"][:, own]) > trace["J"][:, own], axis=1), job.start)
             first = own.stop
         return found
 

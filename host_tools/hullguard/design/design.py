@@ -11,18 +11,21 @@ import numpy as np
 from hullguard.bus.bits import load_bound
 from hullguard.design import hull, store, zonotope
 from hullguard.design.arith import digits, mul
+from hullguard.design.bank_table import FAULT_SIZE, bank_table
+from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
 from hullguard.design.predict import Bounds, predict_table, predicted_groups
-from hullguard.design.reach import largest, reach
+from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
+from hullguard.design.window import Varying
 from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.plant import Feedback
-from hullguard.model.schema import Model, Observer
+from hullguard.model.schema import GENERATORS_MAX, Model, Observer
 from hullguard.model.table import Array
 
 Tick = Callable[[str, int, int], None]  # what is being done, step, of how many
@@ -58,6 +61,14 @@ class Design:
     tables: Tables
     checks: tuple[Check, ...]
     load_bound: float
+
+    @property
+    def judges(self) -> list[str]:
+        """What generators and banks are called, in the order of the decision."""
+        names = [f"observer {i + 1}" for i in range(len(self.generators))]
+        for bank in used_banks(self.model, self.stored):
+            names.append(f"bank of {len(bank.weight)}" if bank.hypothesis is None else f"not {self.model.faults[bank.hypothesis].name}")
+        return names
 
 
 def usual_radius(model: Model) -> Array:
@@ -155,6 +166,9 @@ def find(model: Model, tick: Tick) -> Stored:
     model = _disturbed(model, reached.state, reached.signal)
     radius = usual_radius(model)
     observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
+    if model.detector.isolation is not None:
+        # A hypothesis must not be excluded because its fault moves the plant faster than a healthy one moves.
+        reached = replace(faulty_reach(model, reached), signal=reached.signal)
     spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
     return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), observers, *spread)
@@ -199,7 +213,7 @@ def refilter(model: Model, old: Stored) -> Stored:
         # What the search first drew for other bounds says nothing about these.
         none = np.full(len(paths), np.nan)
         observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised, smallest=digits(smallest, 6), first=none))
-    return replace(found, observers=tuple(observers))
+    return replace(found, observers=tuple(observers), banks=old.banks)
 
 
 def _fits(model: Model, old: Stored) -> bool:
@@ -216,8 +230,8 @@ def _serves(o: StoredObserver, spec: Observer) -> bool:
     return fits and spec.parity is None and spec.poles is None
 
 
-def stored_for(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
-    """The stored numbers of a model, and whether they are the file's own. A search is made only where the file does not help."""
+def _searched(model: Model, fresh: bool, tick: Tick) -> tuple[Stored, bool]:
+    """All but the banks."""
     old = None if fresh else store.read(store.path_of(model.path))
     if old is not None:
         if old.model_sha256 == model.sha256:
@@ -239,7 +253,7 @@ def finish(model: Model, stored: Stored) -> Design:
     groups = tuple(group_table(model, g, stored.slew) for g in model.groups)
     derived = _derived(model, stored, groups)
     generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers)))
-    tables = _tables(model, groups, generators, derived)
+    tables = _tables(model, groups, generators, derived, _banks(model, stored, derived))
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
@@ -385,11 +399,33 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
     )
 
 
-def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...], derived: Derived) -> Tables:
+def used_banks(model: Model, stored: Stored) -> list[StoredBank]:
+    """The stored banks that the model asks for, of the size it asks for: the one for detection, then one a hypothesis."""
+    spec, used = model.detector, []
+    for wanted, isolating in ((spec.bank, False), (spec.isolation, True)):
+        if wanted is not None:
+            fitting = [b for b in stored.banks if (b.hypothesis is not None) == isolating and b.window == wanted.window and b.weight.shape[2] == model.plant.m]
+            used += [replace(b, weight=b.weight[: wanted.size]) for b in fitting if len(b.weight) >= min(wanted.size, 1)]
+    return used
+
+
+def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, ...]:
+    states = list(derived.states)
+    varying = Varying(np.eye(model.plant.n)[:, states], np.zeros((model.plant.m, len(states))))
+    made = []
+    for b in used_banks(model, stored):
+        size = model.faults[b.hypothesis].size_max if b.hypothesis is not None else None
+        made.append(replace(bank_table(model, stored, b, varying, size or FAULT_SIZE), extra=derived.uncertain))
+    if len(model.observers) + len(made) > GENERATORS_MAX:
+        raise InputError(f"{model.path.name}: {len(model.observers)} observers and {len(made)} banks, {GENERATORS_MAX} are possible; isolate fewer faults")
+    return tuple(made)
+
+
+def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...], derived: Derived, banks: tuple[BankTable, ...]) -> Tables:
     made = tuple(_generator_table(model, g, derived) for g in generators)
     verdict, status = verdict_table(model), message_table("status", model.status, 8)
     return Tables(
-        model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch
+        model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch, banks
     )
 
 
@@ -410,7 +446,16 @@ def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, ge
     return checks
 
 
-def design(model: Model, fresh: bool = False, tick: Tick | None = None) -> tuple[Design, bool]:
+def design(model: Model, fresh: bool = False, tick: Tick | None = None, workers: int = 1) -> tuple[Design, bool]:
     """Design a model; the flag says whether the stored numbers are the design file's own."""
-    stored, own = stored_for(model, fresh, tick or (lambda *_: None))
+    stored, own = stored_for(model, fresh, tick or (lambda *_: None), workers)
     return finish(model, stored), own
+
+
+def stored_for(model: Model, fresh: bool, tick: Tick, workers: int = 1) -> tuple[Stored, bool]:
+    """The stored numbers of a model, and whether they are the file's own. A search is made only where the file does not help."""
+    from hullguard.design.learn import learnt  # which designs detectors itself, to learn from them
+
+    stored, own = _searched(model, fresh, tick)
+    whole = learnt(model, stored, workers, tick)
+    return whole, own and whole is stored

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from hullguard.design.bank_types import StoredBank
 from hullguard.errors import InputError
 from hullguard.model.table import Array, Table
 
@@ -46,6 +47,7 @@ class Stored:
     observers: tuple[StoredObserver, ...]
     dA: Array | None = None  # of an uncertain plant only
     dB: Array | None = None
+    banks: tuple[StoredBank, ...] = ()
 
 
 def path_of(model_path: Path) -> Path:
@@ -79,7 +81,25 @@ def write(path: Path, name: str, stored: Stored) -> None:
         data["plant"]["gain"] = stored.gain.tolist()
     if stored.dA is not None and stored.dB is not None:
         data["plant"] |= {"dA": stored.dA.tolist(), "dB": stored.dB.tolist()}
+    if stored.banks:
+        data["banks"] = [_bank(b) for b in stored.banks]
     path.write_text(HEADER.format(name=name) + tomli_w.dumps(data), encoding="utf-8")
+
+
+def _bank(b: StoredBank) -> dict[str, Any]:
+    """Every certificate on its own, window x outputs in one row, the oldest sample first."""
+    kept: dict[str, Any] = {"window": b.window, "faults": b.faults, "certificates": b.weight.reshape(len(b.weight), -1).tolist()}
+    return kept if b.hypothesis is None else kept | {"hypothesis": b.hypothesis}
+
+
+def _read_bank(t: Table) -> StoredBank:
+    window, rows = t.whole("window", 2, 10_000), t.matrix("certificates")
+    if rows.shape[1] % window:
+        raise t.error("certificates", f"{rows.shape[1]} numbers in a row, which is no multiple of the window of {window}")
+    hypothesis = t.whole("hypothesis", 0, 31) if "hypothesis" in t else None
+    bank = StoredBank(window, rows.reshape(len(rows), window, -1), t.whole("faults", 0, 2**32 - 1), hypothesis)
+    t.close()
+    return bank
 
 
 def read(path: Path) -> Stored | None:
@@ -131,6 +151,7 @@ def read(path: Path) -> Stored | None:
         observers=tuple(observers),
         dA=plant.matrix("dA", *A.shape) if "dA" in plant else None,
         dB=(plant.matrix("dB", *B.shape) if B.size else B) if "dA" in plant else None,
+        banks=tuple(_read_bank(t) for t in top.tables("banks", optional=True)),
     )
     for t in (plant, signals, top):
         t.close()

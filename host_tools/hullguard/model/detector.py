@@ -19,6 +19,7 @@ class BankSpec:
     seed: int  # of the runs that it learns from
     runs: int  # a fault and size
     sizes: tuple[float, ...]  # of the faults, signal units, both signs
+    faults: tuple[str, ...]  # names of those it is made for; empty for all
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def _read_bank(t: Table, key: str, size: int) -> BankSpec | None:
         seed=inner.whole("seed", 0, 2**32 - 1, 1),
         runs=inner.whole("runs", 1, 1000, 12),
         sizes=sizes,
+        faults=tuple(inner.names("faults", [])),
     )
     inner.close()
     return spec

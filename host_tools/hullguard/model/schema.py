@@ -230,15 +230,36 @@ def find_model(name: str) -> Path:
     return shipped
 
 
-def load_model(name: str, overrides: dict[str, Any] | None = None, scenario: str | None = None) -> Model:
-    """Read a model by shipped name or path; then what the scenario sets, then `overrides` (dotted keys, as --set gives them)."""
-    path = find_model(name)
+def _read_file(path: Path) -> dict[str, Any]:
+    """A model file's data, over that of the model it is based on."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path.name}: not valid TOML: {error}") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if "base" not in data:
+        return data
+    base = data.pop("base")
+    if not isinstance(base, str) or not (path.parent / base).is_file():
+        raise InputError(f"{path.name}.base: expected the name of a model file beside this one, found {base!r}")
+    beneath = _read_file(path.parent / base) if (path.parent / base) != path else {}
+    return _over(data, beneath)
+
+
+def _over(data: dict[str, Any], beneath: dict[str, Any]) -> dict[str, Any]:
+    """Tables are merged, everything else replaces what is beneath."""
+    merged = dict(beneath)
+    for key, value in data.items():
+        below = beneath.get(key)
+        merged[key] = _over(value, below) if isinstance(value, dict) and isinstance(below, dict) else value
+    return merged
+
+
+def load_model(name: str, overrides: dict[str, Any] | None = None, scenario: str | None = None) -> Model:
+    """Read a model by shipped name or path; then what the scenario sets, then `overrides` (dotted keys, as --set gives them)."""
+    path = find_model(name)
+    data = _read_file(path)
     model = parse_model(data, path)
     changes = dict(model.scenario(scenario).set) | (overrides or {})
     if not changes:
@@ -317,6 +338,10 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     detector = read_detector(inner)
     if detector.feedback_known and plant.feedback is None:
         raise inner.error("feedback_known", "there is no [plant] feedback to know; give one, or remove this")
+    for key, bank in (("bank", detector.bank), ("isolation", detector.isolation)):
+        for n in bank.faults if bank is not None else ():
+            if n not in [f.name for f in faults]:
+                raise inner.error(f"{key}.faults", f"'{n}' is not one of {', '.join(f.name for f in faults) or 'none'}")
     observers = _read_observers(inner, outputs, inputs, faults, detector.bank is None)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     scenarios = _read_scenarios(top, path)
@@ -350,8 +375,12 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
 
 
 def _fingerprint(data: dict[str, Any]) -> str:
-    """SHA-256 of all that a design depends on; scenarios and faults' sizes are not among it."""
+    """SHA-256 of all that the stored numbers of a design depend on: not scenarios, nor what only chooses among them."""
     relevant = {k: v for k, v in data.items() if k != "scenarios"}
+    relevant["detector"] = {k: v for k, v in data.get("detector", {}).items() if k not in ("threshold", "zonotope", "prediction", "feedback_known")}
+    for bank in ("bank", "isolation"):
+        if bank in relevant["detector"]:
+            relevant["detector"][bank] = {k: v for k, v in relevant["detector"][bank].items() if k != "size"}
     return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
 
 
