@@ -176,8 +176,13 @@ def refilter(model: Model, old: Stored) -> Stored:
     for spec, stored in zip(model.observers, old.observers, strict=True):
         sub = sub_plant(model, spec, radius)
         G, H, L, T = structure(sub, stored.v, stored.gamma)
-        f = no_filter(spec.order) if not spec.filtered else post_filter(sub, G, L, H, T, stored.W, stored.V, stored.V @ sub.D, spec.aware)
-        observers.append(replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised))
+        o = ObserverMatrices(stored.v, stored.gamma, G, H, L, T, stored.W, stored.V, stored.V @ sub.D)
+        f = no_filter(spec.order) if not spec.filtered else post_filter(sub, G, L, H, T, o.W, o.V, o.Qu, spec.aware)
+        kept = replace(stored, Lo=digits(f.Lo), Mo=digits(f.Mo), regularised=f.regularised)
+        if spec.filtered:
+            smallest = smallest_faults(sub, o, f, fault_paths(model, spec, spec.faults), np.concatenate([sub.Sy, sub.Su]))
+            kept = replace(kept, smallest=digits(smallest, 6))
+        observers.append(kept)
     return replace(found, observers=tuple(observers))
 
 
