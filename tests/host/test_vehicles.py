@@ -102,11 +102,15 @@ def test_two_vehicles_expand_to_what_one_would_write_by_hand() -> None:
     assert found["detector"]["observers"] == [{"order": 4, "residuals": 2, "faults": ["controller1", "controller2"], "search": {"trials": 3000, "seed": 1}}]
 
 
-def test_three_vehicles_are_the_model_that_the_shipped_design_was_made_for() -> None:
+def test_three_vehicles_have_the_signal_vector_of_the_shipped_tables() -> None:
     model = load_model("platoon")
     assert [s.name for s in model.signals] == ["gap12_m", "gap23_m", "speed1_mps", "control1_mps2", "control2_mps2", "control3_mps2"]
-    design = tomllib.loads((SHIPPED / "platoon.design.toml").read_text(encoding="utf-8"))
-    assert model.sha256 == design["model_sha256"]
+
+
+@pytest.mark.parametrize("name", ["platoon", "openacc"])
+def test_a_shipped_models_design_was_made_for_what_its_templates_expand_to(name: str) -> None:
+    design = tomllib.loads((SHIPPED / f"{name}.design.toml").read_text(encoding="utf-8"))
+    assert load_model(name).sha256 == design["model_sha256"]
 
 
 @pytest.mark.parametrize("vehicles", range(2, 21))
