@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -197,6 +198,23 @@ def test_the_reach_holds_every_plant_inside_even_one_that_varies(pm: float) -> N
         holds(found, *simulated(model, [draw(model.plant, dice) for _ in range(int(dice.choice([1, 4])))], dice))
 
 
+@pytest.mark.parametrize("pm", [0.1, 0.4])
+def test_the_reach_holds_the_exact_one_of_every_corner(pm: float) -> None:
+    """The reach of a certain plant is a maximum that some input attains."""
+    model, certain = load_model("platoon", drag(pm)), reach(load_model("platoon"), HORIZON)
+    plant, found = model.plant, reach(model, HORIZON)
+    assert plant.interval is not None
+    beyond = np.zeros(3, dtype=bool)
+    for corner in itertools.product((-1.0, 1.0), repeat=3):
+        A, B = zero_order_hold(plant.interval.A + np.diag(np.array([corner[0], 0.0, corner[1], 0.0, corner[2]]) * pm), plant.interval.B, 0.1)
+        one = replace(plant, A=A, B=B, dA=np.zeros_like(A), dB=np.zeros_like(B), interval=None)
+        extreme = reach(replace(model, plant=one), HORIZON)
+        pairs = [(getattr(extreme, part), getattr(found, part), getattr(certain, part)) for part in ("state", "signal", "slew")]
+        assert all(np.all(e <= f + SMALL) for e, f, _ in pairs)
+        beyond |= [bool(np.any(e > c * 1.01)) for e, _, c in pairs]
+    assert beyond.all(), "no corner leaves the reach of the middle: this test shows nothing"
+
+
 def test_the_reach_is_wider_than_without_intervals_and_grows_with_them() -> None:
     certain, *wider = (reach(load_model("platoon", drag(pm)), HORIZON) for pm in (0.0, 0.05, 0.2))
     for narrow, wide in ((certain, wider[0]), (wider[0], wider[1])):
@@ -315,6 +333,28 @@ def test_matrices_with_bounds_make_a_detector() -> None:
     model = by_matrices(True, A_pm=[[0.01, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.01]])
     model = replace(model, observers=tuple(replace(o, search=replace(o.search, trials=50)) for o in model.observers))
     assert finish(model, find(model, lambda *_: None)).tables.signals == 4
+
+
+def test_a_plant_without_inputs_may_be_uncertain_too(tmp_path: Path) -> None:
+    """A clock of its own closes the sample; the state decays at 0.8 +- 0.1 a sample: its reach is 0.05 / (1 - 0.9), or where it starts."""
+    data = {
+        **{key: PLATOON[key] for key in ("schema", "kind", "sample_time_s", "verdict")},
+        "name": "heat",
+        "plant": {"A": [[0.8]], "A_pm": [[0.1]], "C": [[1.0]], "discrete": True, "initial_range": [0.1], "disturbance": {"state": 0.05, "output": 0.01}},
+        "signals": [{"name": "heat_k", "role": "output", "range": [-5.0, 5.0], "resolution": 0.001, "slew": "reachable"}],
+        "groups": [
+            {"name": "sensor", "signals": ["heat_k"], "frame": {"id": 0x110}, "trigger": {"delta": 0.0, "sigma": 0.02, "interval_max": 4}},
+            {"name": "clock", "frame": {"id": 0x120}, "transmission": "tick"},
+        ],
+        "faults": [{"name": "heat_sensor", "signal": "heat_k", "type": "sensor"}],
+        "detector": {"observers": [{"order": 1, "residuals": 1, "search": {"trials": 20}}]},
+    }
+    model = parse_model(data, Path("m.toml"))
+    assert reach(model, HORIZON).state[0] == pytest.approx(0.5, rel=0.01)
+    stored = find(model, lambda *_: None)
+    store.write(tmp_path / "m.design.toml", "heat", stored)
+    again = store.read(tmp_path / "m.design.toml")
+    assert again is not None and finish(model, again).tables == finish(model, stored).tables
 
 
 # ---- sizes of faults ----
