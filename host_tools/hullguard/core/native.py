@@ -18,6 +18,7 @@ from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, Ta
 from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.plant import Plant as PlantModel
+from hullguard.model.plant import emulated
 from hullguard.model.schema import Model, Reference
 from hullguard.model.table import Array
 
@@ -350,11 +351,10 @@ def reference_of(library: Library, reference: Reference) -> Any:
 
 
 class PlantConfig:
-    """hgh_plant_config of a design's plant, or of another one of its intervals."""
+    """hgh_plant_config of a plant with a design's signals."""
 
-    def __init__(self, native: Native, design: Design, other: PlantModel | None = None) -> None:
+    def __init__(self, native: Native, design: Design, plant: PlantModel) -> None:
         ffi, model = native.library.ffi, design.model
-        plant = other or model.plant
         if plant.n > 64 or plant.p > 64 or len(model.signals) > 96 or plant.Ed.shape[1] > 192:
             raise InputError(f"model {model.name}: the emulator has room for 64 states, 96 signals and 192 disturbances")
         self._keep: list[Any] = []
@@ -394,8 +394,9 @@ class PlantConfig:
 class Plant:
     """The emulated plant."""
 
-    def __init__(self, native: Native, design: Design, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int = 0, other: PlantModel | None = None) -> None:
-        self._native, self._config = native, PlantConfig(native, design, other)
+    def __init__(self, native: Native, design: Design, reference: Reference, faults: Sequence[FaultSpec], seed: int, run: int = 0) -> None:
+        plants = emulated(design.model.plant, seed)
+        self._native, self._config = native, PlantConfig(native, design, plants[run % len(plants)])
         ffi = native.library.ffi
         self._plant, self._value = ffi.new("hgh_plant *"), ffi.new("double[]", len(design.model.signals))
         array = fault_array(native.library, design.model, faults)
@@ -469,12 +470,12 @@ class Batch:
         initial: Array | None = None,
         plants: Sequence[PlantModel] = (),
     ) -> None:
-        """`plants`: what the runs emulate in turn, plants of the design's intervals; the design's own plant where there are none."""
+        """`plants`: what the runs emulate in turn; without them plants of the model's intervals, drawn by the seed."""
         ffi, model = native.library.ffi, design.model
         self._native, self._model = native, model
-        emulated = [PlantConfig(native, design, p) for p in plants] or [PlantConfig(native, design)]
-        configs = ffi.new("hgh_plant_config[]", [p.config[0] for p in emulated])
-        self._keep: list[Any] = [configs, fault_array(native.library, model, faults), emulated]
+        made = [PlantConfig(native, design, p) for p in plants or emulated(model.plant, seed)]
+        configs = ffi.new("hgh_plant_config[]", [p.config[0] for p in made])
+        self._keep: list[Any] = [configs, fault_array(native.library, model, faults), made]
 
         def doubles(a: Array) -> Any:
             flat = np.ascontiguousarray(a, dtype=np.float64)
@@ -484,7 +485,7 @@ class Batch:
         c = ffi.new("hgh_run_config *")
         c.node, c.sender = native.node, native.senders
         if series is None:
-            c.plant, c.plants = configs, len(emulated)
+            c.plant, c.plants = configs, len(made)
         else:
             if samples > len(series):
                 raise InputError(f"{samples} samples asked for, the recording has {len(series)}")

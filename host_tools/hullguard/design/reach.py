@@ -94,7 +94,7 @@ def _fixed_point(states: tuple[str, ...], gain: Array, constant: Array) -> Array
     radius = float(np.abs(values).max())
     if radius >= 1.0:
         worst = states[int(np.argmax(np.abs(vectors[:, int(np.argmax(np.abs(values)))])))]
-        raise InputError(f"[plant] intervals too wide: what they add to '{worst}' comes back {radius:.3g} times as large, not less than once; make the pm that moves it smaller")
+        raise InputError(f"[plant] intervals too wide: what they add to '{worst}' comes back {radius:.3g} times as large, nothing bounds it; make the pm that moves it smaller")
     return np.asarray(np.linalg.solve(np.eye(len(constant)) - gain, constant) * (1 + 1e-9))
 
 

@@ -150,7 +150,7 @@ def read(path: Path) -> Stored | None:
         slew=signals.matrix("slew", len(reach)),
         observers=tuple(observers),
         dA=plant.matrix("dA", *A.shape) if "dA" in plant else None,
-        dB=(plant.matrix("dB", *B.shape) if B.size else B) if "dA" in plant else None,
+        dB=(plant.matrix("dB", *B.shape) if B.size else B) if "dB" in plant else None,
         banks=tuple(_read_bank(t) for t in top.tables("banks", optional=True)),
     )
     for t in (plant, signals, top):

@@ -17,6 +17,8 @@ from hullguard.model.builders import BUILDERS, Interval
 from hullguard.model.table import Array, Table
 from hullguard.model.uncertain import drawn, enclosure, zero_order_hold
 
+PLANTS = 64  # that stand for an uncertain one in a campaign
+
 
 @dataclass(frozen=True)
 class Feedback:
@@ -71,6 +73,14 @@ def draw(plant: Plant, rng: np.random.Generator) -> Plant:
     if plant.hold_s is not None:
         A, B = zero_order_hold(A, B, plant.hold_s)
     return replace(plant, A=A, B=B, dA=np.zeros_like(A), dB=np.zeros_like(B), interval=None)
+
+
+def emulated(plant: Plant, seed: int) -> list[Plant]:
+    """What the runs of a seed emulate in turn: the plant itself, or as many as PLANTS inside its intervals."""
+    if plant.interval is None:
+        return [plant]
+    rng = np.random.default_rng(seed)
+    return [draw(plant, rng) for _ in range(PLANTS)]
 
 
 def _read_matrices(table: Table, outputs: int, inputs: int) -> tuple[Interval, Array, Array]:

@@ -135,6 +135,9 @@ def _plant(design: Design) -> Iterator[str]:
     named = {"A": plant.A, "B": plant.B, "C": plant.C, "D": plant.D, "Ed": plant.Ed, "Fd": plant.Fd}
     if plant.feedback is not None:
         named["K"] = plant.feedback.gain
+    if plant.interval is not None:
+        named |= {"dA": plant.dA, "dB": plant.dB}
+        yield "<p>The plant is any with |A* − A| ≤ dA and |B* − B| ≤ dB, entry by entry, even one that varies; reach, slews and thresholds hold for all of them.</p>"
     states = ", ".join(f"{name} ≤ {num(float(r))}" for name, r in zip(plant.states, design.stored.state_range, strict=True))
     yield f"<p>Largest magnitudes of the states: {esc(states)}.</p>"
     yield (
