@@ -52,9 +52,9 @@ class Threshold:
         self._lib.hg_zonotope_step(self._self, self._ring, self._J)
         return list(self._J)
 
-    def run(self, radius: Array) -> Array:
-        """J, samples x residuals, from a start at rest."""
-        self._lib.hg_zonotope_reset(self._self, 1)
+    def run(self, radius: Array, start: int = 1) -> Array:
+        """J, samples x residuals, from a start at rest (1) or in a moving plant (0)."""
+        self._lib.hg_zonotope_reset(self._self, start)
         return np.array([self.step(r) for r in radius])
 
 
@@ -127,16 +127,16 @@ def linears() -> list[tuple[hull.Linear, Array, np.random.Generator]]:
     """Random generators that can have a zonotope; hardly any can not."""
     made: list[tuple[hull.Linear, Array, np.random.Generator]] = []
     refused = 0
-    for i in range(60):
+    for i in range(40):
         rng = np.random.default_rng([SEED, i])
         lin, radius = random_linear(rng, ("modal", "deadbeat", "multiple", "companion")[i % 4])
         try:
-            table_of(lin, radius, 12, BALL)
+            table_of(lin, radius, 250, BALL)
             made.append((lin, radius, rng))
         except InputError as error:
             refused += 1
             assert "\n" not in str(error)
-    assert refused <= 6
+    assert refused <= 8
     return made
 
 
@@ -198,11 +198,11 @@ def test_truncation_falls_below_the_exact_sum(linears: list[tuple[hull.Linear, A
 def test_late_radii_are_as_sound_as_radii_from_the_start(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     for lin, radius, rng in linears:
         columns = int(rng.integers(len(lin.state), 20))
-        known = random_radii(rng, radius, 60)
+        known = random_radii(rng, radius, 40)
         final = known.copy()
         table = table_of(lin, radius, columns, reduction)
         threshold = Threshold(library(real), table)
-        for k in range(60):
+        for k in range(40):
             late = []
             for lag in rng.permutation(np.arange(1, min(k, 12) + 1)) if rng.random() < 0.2 else ():
                 # The difference is exact in float32; some radii turn out smaller, which must not narrow the set.
@@ -217,14 +217,13 @@ def test_late_radii_are_as_sound_as_radii_from_the_start(linears: list[tuple[hul
 def test_late_radii_cost_nothing_where_there_is_room(linears: list[tuple[hull.Linear, Array, np.random.Generator]]) -> None:
     for lin, radius, _ in linears:
         table = table_of(lin, radius, 200, BALL)
-        threshold, twin = Threshold(library("f64"), table), Threshold(library("f64"), table)
+        threshold = Threshold(library("f64"), table)
         for _ in range(10):
             threshold.step(radius)
-            twin.step(radius)
         late = threshold.step(radius, [(lag, radius) for lag in range(1, 6)])
         R = np.vstack([np.tile(radius, (5, 1)), np.tile(2 * radius, (5, 1)), radius])
-        assert np.allclose(late, exact(lin, R, np.array(table.bias_rest))[-1], rtol=0.1)
-        assert np.any(np.array(late) > np.array(twin.step(radius)))
+        over = late - exact(lin, R, np.array(table.bias_rest))[-1]
+        assert np.all(over < 3 * zonotope.SHARE_MAX * exact(lin, np.tile(radius, (100, 1)), np.array(table.bias_rest))[-1])
 
 
 def test_discs_stay_bounded_where_boxes_grow_for_ever() -> None:
@@ -308,6 +307,25 @@ def delays(made: Design, traces: list[dict[str, Array]], table: ZonotopeTable, r
     return early, float(np.mean(late)) if late else np.inf, missed
 
 
+@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("start", [0, 1])
+@pytest.mark.parametrize("published", [False, True])
+def test_disturbances_and_the_initial_set_are_never_below_their_exact_sum(models: Models, real: str, start: int, published: bool) -> None:
+    """As columns or as bias: at rest and in a moving plant J holds what each part of the set can do."""
+    made = models.design()
+    g, m = made.generators[0], made.model.plant.m
+    T, Bd = g.observer.T, g.observer.T @ g.plant.Ed - g.linear.input[:, :m] @ g.plant.Fd
+    box = made.stored.state_range if start == 0 else made.model.plant.initial_range
+    driven, F, bias = np.abs(g.linear.direct[:, :m] @ g.plant.Fd).sum(1), g.linear.output, []
+    for _ in range(SAMPLES):
+        bias.append(driven + np.abs(F @ T * box).sum(1))
+        driven, F = driven + np.abs(F @ Bd).sum(1), F @ g.linear.state
+    R = random_radii(np.random.default_rng([SEED, 3]), g.radius, SAMPLES)
+    for reduction in SOUND:
+        found = Threshold(library(real), table_for(made, 0, 12, reduction, published)).run(R, start)
+        assert np.all(found >= exact(g.linear, R, np.array(bias)))
+
+
 @pytest.fixture(scope="module")
 def faulty(models: Models) -> dict[float, list[dict[str, Array]]]:
     """Runs with a controller fault on vehicle 2 from sample 100."""
@@ -343,17 +361,20 @@ def test_boxes_with_disturbances_as_columns_are_as_late_as_published_ones(models
             assert least <= late <= most
 
 
-def test_published_truncation_raises_false_alarms(models: Models) -> None:
+def test_published_truncation_is_no_outer_bound_and_raises_false_alarms(models: Models) -> None:
+    """How many depends on the design as well: with the one of the method note 12 columns do in 87 of 100 runs what 8 do here in about 40."""
     made, ready = models.design(), models.platoon("rest")
     batch = ready.batch(100)
-    threshold = Threshold(library("f32"), table_for(made, 0, 12, TRUNCATE, True))
+    eight, twelve = (Threshold(library("f32"), table_for(made, 0, q, TRUNCATE, True)) for q in (8, 12))
     places = list(made.tables.generators[0].signal)
-    worst = []
+    alarms, share = 0, []
     for i in range(RUNS):
         trace = batch.trace(i)
-        worst.append(float((np.abs(trace["r"]) / threshold.run(trace["radius"][:, places])).max()))
-    assert np.mean(np.array(worst) > 1.0) > 0.5
-    assert max(worst) > 1.5
+        alarms += bool(np.any(np.abs(trace["r"]) > eight.run(trace["radius"][:, places])))
+        share.append((twelve.run(trace["radius"][:, places]) / trace["J"])[20:])
+    assert alarms > RUNS / 6
+    assert np.mean(share) < 0.7
+    assert np.max(share) < 1.0
 
 
 def test_every_generator_of_openacc_has_a_zonotope_close_to_its_hull(models: Models) -> None:
