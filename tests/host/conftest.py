@@ -25,9 +25,7 @@ def pytest_configure(config: pytest.Config) -> None:
         hypothesis.core.global_force_seed = SEED
     # Commands that are run as processes find the package where the tests do.
     path = os.environ.get("PYTHONPATH", "")
-    os.environ["PYTHONPATH"] = os.pathsep.join(
-        [str(ROOT / "host_tools"), *([path] if path else [])]
-    )
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT / "host_tools"), *([path] if path else [])])
 
 
 def pytest_report_header() -> str:

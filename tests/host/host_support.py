@@ -85,9 +85,7 @@ class Models:
         chosen = made.model.scenario(scenario)
         key = ("platoon", json.dumps(overrides or {}, sort_keys=True), scenario, real)
         if lib is not None:
-            return Ready(
-                made, Native(lib, made.tables), chosen.reference, chosen.samples
-            )
+            return Ready(made, Native(lib, made.tables), chosen.reference, chosen.samples)
         if key not in self._made:
             self._made[key] = Ready(
                 made,
@@ -124,9 +122,7 @@ class Result:
     @property
     def json(self) -> dict[str, Any]:
         lines = self.out.splitlines()
-        assert len(lines) == 1, (
-            f"--json must print one line on stdout, found {len(lines)}"
-        )
+        assert len(lines) == 1, f"--json must print one line on stdout, found {len(lines)}"
         found = json.loads(lines[0])
         assert isinstance(found, dict)
         return found
@@ -171,9 +167,7 @@ def build_library(
     for name, changes in (patch or {}).items():
         text = (source / name).read_text(encoding="utf-8")
         for old, new in changes:
-            assert text.count(old) == 1, (
-                f"{name}: the text to mutate is there {text.count(old)} times: {old}"
-            )
+            assert text.count(old) == 1, f"{name}: the text to mutate is there {text.count(old)} times: {old}"
             text = text.replace(old, new)
         (source / name).write_text(text, encoding="utf-8")
     if extra:
@@ -227,9 +221,7 @@ EXTENDED, REMOTE = 0x01, 0x02
 
 def crc15(bits: list[int]) -> list[int]:
     """x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 by long division."""
-    polynomial = [
-        1 if e in (15, 14, 10, 8, 7, 4, 3, 0) else 0 for e in range(15, -1, -1)
-    ]
+    polynomial = [1 if e in (15, 14, 10, 8, 7, 4, 3, 0) else 0 for e in range(15, -1, -1)]
     rest = bits + [0] * 15
     for i in range(len(bits)):
         if rest[i]:
@@ -267,9 +259,5 @@ def classic_bits(frame: Frame) -> int:
         ]
     else:
         header = [0, *binary(frame.id, 11), remote, 0, 0]
-    bits = (
-        header
-        + binary(len(frame.data), 4)
-        + [b for byte in frame.data for b in binary(byte, 8)]
-    )
+    bits = header + binary(len(frame.data), 4) + [b for byte in frame.data for b in binary(byte, 8)]
     return len(stuffed(bits + crc15(bits))) + 1 + 2 + 7 + 3

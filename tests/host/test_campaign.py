@@ -66,11 +66,7 @@ def case_of(
 
 
 def same(a: Sequence[Rows], b: Sequence[Rows]) -> bool:
-    return len(a) == len(b) and all(
-        list(x) == list(y) == list(COLUMNS)
-        and all(np.array_equal(x[n], y[n]) for n in COLUMNS)
-        for x, y in zip(a, b, strict=True)
-    )
+    return len(a) == len(b) and all(list(x) == list(y) == list(COLUMNS) and all(np.array_equal(x[n], y[n]) for n in COLUMNS) for x, y in zip(a, b, strict=True))
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -146,11 +142,7 @@ def test_a_grid_has_a_case_for_every_combination_and_each_is_the_campaign_of_its
             c["fault"],
         )
         alone = cli(*FEW, "--runs", 4, *one).json
-        assert alone["rows"] == [
-            {k: v for k, v in r.items() if k != "case"}
-            for r in found["rows"]
-            if r["case"] == c["case"]
-        ]
+        assert alone["rows"] == [{k: v for k, v in r.items() if k != "case"} for r in found["rows"] if r["case"] == c["case"]]
         assert alone["model_hash"] == c["model_hash"]
         assert all(
             alone[k] == c[k]
@@ -179,16 +171,12 @@ def test_faults_of_one_run_stay_together_without_each_fault(cli: Cli) -> None:
         "--size",
         "2,4",
     ).json
-    assert [c["faults"] for c in found["cases"]] == [
-        [f"controller2:bias:{s}@40", f"gap12_m:bias:{s}@50"] for s in (2, 4)
-    ]
+    assert [c["faults"] for c in found["cases"]] == [[f"controller2:bias:{s}@40", f"gap12_m:bias:{s}@50"] for s in (2, 4)]
 
 
 def test_values_of_a_key_are_split_outside_brackets_and_quotes() -> None:
     found = grid.combinations(["a.b=[1, 2],[3]", "c=x,'y,z',true"])
-    assert [(c["a.b"], c["c"]) for c in found] == list(
-        itertools.product(([1, 2], [3]), ("x", "y,z", True))
-    )
+    assert [(c["a.b"], c["c"]) for c in found] == list(itertools.product(([1, 2], [3]), ("x", "y,z", True)))
     assert grid.combinations([]) == [{}]
 
 
@@ -203,12 +191,8 @@ BAD: list[tuple[tuple[object, ...], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("options", "word"), BAD, ids=[" ".join(map(str, o)) for o, _ in BAD]
-)
-def test_a_grid_that_makes_no_sense_is_refused_in_one_line(
-    cli: Cli, options: tuple[object, ...], word: str
-) -> None:
+@pytest.mark.parametrize(("options", "word"), BAD, ids=[" ".join(map(str, o)) for o, _ in BAD])
+def test_a_grid_that_makes_no_sense_is_refused_in_one_line(cli: Cli, options: tuple[object, ...], word: str) -> None:
     result = cli(
         "campaign",
         "platoon",
@@ -262,9 +246,7 @@ class Stop(Exception):
     """What ends a campaign in the middle."""
 
 
-def test_an_interrupted_campaign_goes_on_where_it_was(
-    models: Models, tmp_path: Path
-) -> None:
+def test_an_interrupted_campaign_goes_on_where_it_was(models: Models, tmp_path: Path) -> None:
     cases = [case_of(models, faults=[FAULT], attack=0.2), case_of(models, SILENT_1)]
     once = campaign(cases, 20, serial, size=4)
     made: list[Task] = []
@@ -283,9 +265,7 @@ def test_an_interrupted_campaign_goes_on_where_it_was(
         campaign(cases, 20, until(3), kept=Chunks(tmp_path), size=4)
     kept = sorted(tmp_path.iterdir())
     assert len(kept) == 3
-    kept[0].write_text(
-        kept[0].read_text(encoding="utf-8")[:-40], encoding="utf-8"
-    )  # damaged: made again
+    kept[0].write_text(kept[0].read_text(encoding="utf-8")[:-40], encoding="utf-8")  # damaged: made again
     (tmp_path / f"{kept[1].stem}.123.part").write_text("{", encoding="utf-8")
     made.clear()
     ticks = [0, 0]
@@ -297,16 +277,12 @@ def test_an_interrupted_campaign_goes_on_where_it_was(
     assert len(made) == len(tasks_of(cases, 20, 4)) - 2
     assert ticks == [20, 20]
     made.clear()
-    assert same(campaign(cases, 20, until(0), kept=Chunks(tmp_path), size=4), once), (
-        "all of it is there"
-    )
+    assert same(campaign(cases, 20, until(0), kept=Chunks(tmp_path), size=4), once), "all of it is there"
     longer = campaign(cases, 24, until(2), kept=Chunks(tmp_path), size=4)
     assert [len(made), *(len(r["run"]) for r in longer)] == [2, 24, 24]
 
 
-def test_a_killed_campaign_ends_with_the_files_of_one_that_was_not(
-    cli: Cli, tmp_path: Path
-) -> None:
+def test_a_killed_campaign_ends_with_the_files_of_one_that_was_not(cli: Cli, tmp_path: Path) -> None:
     command = (
         "campaign",
         "platoon",
@@ -358,9 +334,7 @@ def test_a_killed_campaign_ends_with_the_files_of_one_that_was_not(
     assert files(tmp_path / "killed") == once
 
 
-def test_designs_of_a_grid_are_made_once(
-    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_designs_of_a_grid_are_made_once(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = (
         "campaign",
         "platoon",
@@ -395,18 +369,14 @@ def address() -> Iterator[str]:
     here = Path.cwd()
     os.chdir("/")
     try:
-        with LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=":0"
-        ) as made:
+        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
             os.chdir(here)
             yield made.scheduler_address
     finally:
         os.chdir(here)
 
 
-def test_a_cluster_gives_the_same_results_from_a_model_that_only_the_caller_has(
-    cli: Cli, tmp_path: Path, address: str
-) -> None:
+def test_a_cluster_gives_the_same_results_from_a_model_that_only_the_caller_has(cli: Cli, tmp_path: Path, address: str) -> None:
     for name in ("platoon.toml", "platoon.design.toml"):
         (tmp_path / name).write_bytes((SHIPPED / name).read_bytes())
     options = (
@@ -444,9 +414,7 @@ def test_a_worker_with_another_build_of_the_library_is_refused(models: Models) -
         chunk(replace(case, setup=replace(case.setup, build="another")), 0, 1)
 
 
-def test_a_cluster_that_is_not_there_is_one_clear_line(
-    cli: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cluster_that_is_not_there_is_one_clear_line(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.3)
     few = (
         "campaign",
@@ -500,18 +468,12 @@ def test_tables_have_a_row_a_run_with_its_case(cli: Cli, tmp_path: Path) -> None
             float(lines[i]["loss"]),
             lines[i]["fault"],
         ) == (case["loss"], case["fault"]) * 2
-        assert columns["groups.measurement.trigger.silence"][i] == str(
-            case["groups.measurement.trigger.silence"]
-        )
-        assert columns["delay"][i] == (
-            None if row["provisional_at"] < 0 else row["provisional_at"] - 40
-        )
+        assert columns["groups.measurement.trigger.silence"][i] == str(case["groups.measurement.trigger.silence"])
+        assert columns["delay"][i] == (None if row["provisional_at"] < 0 else row["provisional_at"] - 40)
     assert pq.read_schema(tmp_path / "t.parquet").field("margin").type == pa.float64()
 
 
-def test_without_pyarrow_parquet_is_refused_and_a_folder_gets_csv(
-    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_pyarrow_parquet_is_refused_and_a_folder_gets_csv(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     few = (
         "campaign",
         "platoon",
@@ -536,15 +498,11 @@ def test_without_pyarrow_parquet_is_refused_and_a_folder_gets_csv(
     assert not (tmp_path / "results.parquet").exists()
 
 
-@pytest.mark.parametrize(
-    ("hits", "runs"), [(0, 1), (0, 100), (3, 100), (99, 100), (100, 100), (0, 10_000)]
-)
+@pytest.mark.parametrize(("hits", "runs"), [(0, 1), (0, 100), (3, 100), (99, 100), (100, 100), (0, 10_000)])
 def test_the_bound_of_false_alarms_is_exact(hits: int, runs: int) -> None:
     """The smallest share with which so few hits are as rare as 5 %."""
     bound = upper_bound(hits, runs)
-    assert scipy.stats.binom.cdf(hits, runs, bound) == pytest.approx(
-        1.0 if hits == runs else 0.05, rel=1e-6
-    )
+    assert scipy.stats.binom.cdf(hits, runs, bound) == pytest.approx(1.0 if hits == runs else 0.05, rel=1e-6)
 
 
 def test_a_summary_is_that_of_its_rows(models: Models) -> None:
@@ -557,21 +515,14 @@ def test_a_summary_is_that_of_its_rows(models: Models) -> None:
     delays = np.concatenate([r["provisional_at"] for _, r in parts]) - 40
     assert (delays >= 0).all()
     assert both["delay_mean"] == delays.mean()
-    assert (both["delay_p10"], both["delay_p90"]) == tuple(
-        np.percentile(delays, [10, 90])
-    )
+    assert (both["delay_p10"], both["delay_p90"]) == tuple(np.percentile(delays, [10, 90]))
     assert both["silent_share"] == sum(int(r["silent"].sum()) for _, r in parts) / 8000
     hard = parts[0][1]["attacked"] == 1
     assert (both["attacked"]["runs"], both["not_attacked"]["runs"]) == (10, 70)
-    assert (
-        both["attacked"]["margin_settled_max"]
-        == parts[0][1]["margin_settled"][hard].max()
-    )
+    assert both["attacked"]["margin_settled_max"] == parts[0][1]["margin_settled"][hard].max()
 
 
-def test_a_report_shows_the_grid_and_is_drawn_again_to_the_byte(
-    cli: Cli, tmp_path: Path
-) -> None:
+def test_a_report_shows_the_grid_and_is_drawn_again_to_the_byte(cli: Cli, tmp_path: Path) -> None:
     options = (
         "campaign",
         "platoon",
@@ -609,9 +560,7 @@ def test_a_report_shows_the_grid_and_is_drawn_again_to_the_byte(
     assert files(tmp_path) == before
 
 
-def test_a_report_shows_the_limit_where_a_case_has_one(
-    cli: Cli, tmp_path: Path
-) -> None:
+def test_a_report_shows_the_limit_where_a_case_has_one(cli: Cli, tmp_path: Path) -> None:
     options = (
         "campaign",
         "platoon",
@@ -668,9 +617,7 @@ def test_rows_of_many_runs_are_in_the_table_only(cli: Cli, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("burst", [0, 1, 3, 9])
-def test_a_burst_takes_all_frames_of_its_group_and_then_ends(
-    models: Models, burst: int
-) -> None:
+def test_a_burst_takes_all_frames_of_its_group_and_then_ends(models: Models, burst: int) -> None:
     batch = models.platoon("manoeuvres").batch(2000, loss=0.05, burst=burst)
     trace = batch.trace(0)
     sent, lost = trace["events"] & 1, trace["lost"] & 1
@@ -691,11 +638,7 @@ def test_a_burst_takes_all_frames_of_its_group_and_then_ends(
 def test_no_alarm_is_confirmed_whatever_burst_of_losses_comes(models: Models) -> None:
     for burst, overrides in itertools.product((2, 5, 12), (None, SILENT_1, ADAPTIVE)):
         rows = campaign(
-            [
-                case_of(
-                    models, overrides, loss=0.1, burst=burst, attack=0.1, samples=200
-                )
-            ],
+            [case_of(models, overrides, loss=0.1, burst=burst, attack=0.1, samples=200)],
             100,
         )[0]
         assert rows["lost"].sum() > 0
@@ -704,23 +647,16 @@ def test_no_alarm_is_confirmed_whatever_burst_of_losses_comes(models: Models) ->
 
 @pytest.mark.parametrize("silence", [0, 1, 3])
 def test_samples_of_the_silent_phase_are_counted(models: Models, silence: int) -> None:
-    batch = models.platoon(
-        "manoeuvres", {"groups.measurement.trigger.silence": silence}
-    ).batch(300)
+    batch = models.platoon("manoeuvres", {"groups.measurement.trigger.silence": silence}).batch(300)
     sent = np.nonzero(batch.trace(2)["events"] & 1)[0]
-    expected = sum(
-        min(silence, after - before - 1)
-        for before, after in itertools.pairwise([*sent, 300])
-    )
+    expected = sum(min(silence, after - before - 1) for before, after in itertools.pairwise([*sent, 300]))
     assert batch.runs(2, 1)[0]["silent"] == expected
 
 
 # ---- the attack ----
 
 
-def attack_on(
-    ready: Ready, last: int = 149, **options: Any
-) -> tuple[Attack, np.ndarray, np.ndarray]:
+def attack_on(ready: Ready, last: int = 149, **options: Any) -> tuple[Attack, np.ndarray, np.ndarray]:
     plant = ready.design.model.plant
     d, x = np.zeros((150, plant.Ed.shape[1])), np.zeros(plant.n)
     return (
@@ -737,13 +673,9 @@ def attack_on(
     )
 
 
-@pytest.mark.parametrize(
-    "overrides", [None, SILENT_1, ADAPTIVE], ids=["always", "silent", "adaptive"]
-)
+@pytest.mark.parametrize("overrides", [None, SILENT_1, ADAPTIVE], ids=["always", "silent", "adaptive"])
 @pytest.mark.parametrize("real", ["f32", "f64"])
-def test_attacked_runs_come_closer_to_the_threshold_than_random_ones_and_never_pass_it(
-    models: Models, overrides: dict[str, Any] | None, real: str
-) -> None:
+def test_attacked_runs_come_closer_to_the_threshold_than_random_ones_and_never_pass_it(models: Models, overrides: dict[str, Any] | None, real: str) -> None:
     case = case_of(models, overrides, real=real, attack=0.25, samples=150)
     rows = campaign([case], 160)[0]
     hard, easy = (
@@ -782,9 +714,7 @@ def test_an_attack_aims_before_the_fault(models: Models) -> None:
         assert drawn[1] <= 9
         random = rng.choice([-1.0, 1.0], d.shape)
         made.run(number)
-        assert np.array_equal(d[10:], random[10:]), (
-            "behind the last sample nothing is chosen"
-        )
+        assert np.array_equal(d[10:], random[10:]), "behind the last sample nothing is chosen"
 
 
 def test_residuals_are_the_functionals_that_an_attack_takes_them_for(
@@ -802,9 +732,7 @@ def test_residuals_are_the_functionals_that_an_attack_takes_them_for(
         weights = attack.functionals(made.tables, 120)
         for k in (125, 149):
             r = np.einsum("ijg,jg->i", weights, trace["value"][k - np.arange(121)])
-            assert np.abs(r - trace["r"][k]).max() <= 1e-6 * max(
-                1.0, np.abs(trace["r"]).max()
-            ), name
+            assert np.abs(r - trace["r"][k]).max() <= 1e-6 * max(1.0, np.abs(trace["r"]).max()), name
 
 
 def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_them_to(
@@ -821,19 +749,14 @@ def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_the
         rng.uniform(-1.0, 1.0, (2, 31, plant.Ed.shape[1])),
         rng.uniform(-1.0, 1.0, (2, plant.n)) * plant.initial_range,
     )
-    before, after = (
-        ready.batch(31, disturbance=d[i], initial=x[i]).trace(0)["reading"]
-        for i in (0, 1)
-    )
+    before, after = (ready.batch(31, disturbance=d[i], initial=x[i]).trace(0)["reading"] for i in (0, 1))
     predicted = moves @ np.concatenate([(d[1] - d[0]).ravel(), x[1] - x[0]])
     # The plant applies what the wire carries: each sample's inputs are rounded, and the loop carries that on.
     assert np.abs(after - before - predicted).max() <= 20 * quantum
     assert np.abs(predicted).max() > 200 * quantum
 
 
-def test_a_pattern_that_no_disturbance_fits_ends_the_attack(
-    models: Models, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pattern_that_no_disturbance_fits_ends_the_attack(models: Models, monkeypatch: pytest.MonkeyPatch) -> None:
     made, _, _ = attack_on(models.platoon("manoeuvres"))
     plain = made._promises
 
@@ -871,16 +794,12 @@ def test_a_chunk_of_an_attacked_case_leaves_the_other_runs_as_they_are(
         chunk(case_of(models, attack=0.25), 3, 8),
     )
     for n in range(8):
-        equal = all(
-            plain[name][n] == hard[name][n] for name in COLUMNS if name != "attacked"
-        )
+        equal = all(plain[name][n] == hard[name][n] for name in COLUMNS if name != "attacked")
         assert equal == (hard["attacked"][n] == 0), n
     assert hard["attacked"].tolist() == [1, 0, 0, 0, 1, 0, 0, 0]
 
 
-def test_kept_designs_are_the_designs_to_the_bit(
-    models: Models, tmp_path: Path
-) -> None:
+def test_kept_designs_are_the_designs_to_the_bit(models: Models, tmp_path: Path) -> None:
     made = models.design(SILENT_1, "manoeuvres")
     store.write(tmp_path / "x.design.toml", "x", made.stored)
     again = store.read(tmp_path / "x.design.toml")

@@ -73,9 +73,7 @@ def good(result: Result) -> Result:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_of_every_command_is_there_and_names_the_exit_statuses(
-    cli: Cli, command: str
-) -> None:
+def test_help_of_every_command_is_there_and_names_the_exit_statuses(cli: Cli, command: str) -> None:
     result = cli(command, "--help")
     assert (result.status, result.err) == (0, "")
     assert f"usage: hullguard {command}" in result.out
@@ -105,9 +103,7 @@ def test_the_package_is_a_command() -> None:
 
 
 @pytest.fixture(scope="module")
-def finished(
-    tmp_path_factory: pytest.TempPathFactory, models: Models
-) -> tuple[Path, dict[str, Any]]:
+def finished(tmp_path_factory: pytest.TempPathFactory, models: Models) -> tuple[Path, dict[str, Any]]:
     """A run with its files, made as a process: what is on stdout is the JSON and nothing else."""
     out = tmp_path_factory.mktemp("run") / "deep" / "er"
     command = [
@@ -141,9 +137,7 @@ def finished(
     return out, json.loads(done.stdout)
 
 
-def test_a_run_says_all_that_the_design_promises(
-    finished: tuple[Path, dict[str, Any]], models: Models
-) -> None:
+def test_a_run_says_all_that_the_design_promises(finished: tuple[Path, dict[str, Any]], models: Models) -> None:
     _, found = finished
     has(found, RUN_KEYS)
     has(found["frames"], FRAME_KEYS)
@@ -155,11 +149,7 @@ def test_a_run_says_all_that_the_design_promises(
         found["bitrate"],
     ) == ("platoon", "f32", 220, 11, 500000)
     assert found["model_hash"] == f"{models.design().tables.hash:08x}"
-    assert (
-        found["frames"]["load_mean"]
-        <= found["frames"]["load_p99"]
-        <= found["frames"]["load_bound"]
-    )
+    assert found["frames"]["load_mean"] <= found["frames"]["load_p99"] <= found["frames"]["load_bound"]
     assert set(found["events"]) == {"interval_min", "interval_max"}
     assert set(found["false_alarms"]) == {"provisional", "confirmed"}
     assert [f["name"] for f in found["faults"]] == ["controller2", "gap12_m"]
@@ -175,11 +165,7 @@ def test_a_run_says_all_that_the_design_promises(
         assert f["delay"] == f["detected_at"] - f["start"]
     assert "controller2" in found["faults"][0]["candidates"]
     assert found["verdicts"][0]["k"] == 0
-    assert (
-        set(found["per_group"])
-        == set(found["verdicts"][0]["bus"])
-        == {"measurement", "control"}
-    )
+    assert set(found["per_group"]) == set(found["verdicts"][0]["bus"]) == {"measurement", "control"}
     assert 0.0 < found["margin_max"] <= 1.0
 
 
@@ -201,27 +187,13 @@ def test_frames_and_bits_of_a_run_can_be_recounted_from_its_log(
 ) -> None:
     out, found = finished
     frames = [e.frame for e in candump.read(out / "run.log")]
-    count = {
-        number: sum(f.id == number for f in frames)
-        for number in (0x110, 0x120, 0x130, 0x131)
-    }
+    count = {number: sum(f.id == number for f in frames) for number in (0x110, 0x120, 0x130, 0x131)}
     told = found["frames"]
-    assert (
-        sum(count.values()) == len(frames) == told["total"] + told["lockstep_replies"]
-    )
-    assert (
-        count[0x110]
-        == told["measurement"]
-        == found["per_group"]["measurement"]["frames"]
-    )
+    assert sum(count.values()) == len(frames) == told["total"] + told["lockstep_replies"]
+    assert count[0x110] == told["measurement"] == found["per_group"]["measurement"]["frames"]
     assert count[0x120] == found["samples"] == found["per_group"]["control"]["frames"]
-    assert (
-        sum(classic_bits(f) for f in frames)
-        == told["bits"] + told["bits_lockstep_replies"]
-    )
-    assert told["load_mean"] == pytest.approx(
-        told["bits"] / (found["samples"] * 0.1 * found["bitrate"])
-    )
+    assert sum(classic_bits(f) for f in frames) == told["bits"] + told["bits_lockstep_replies"]
+    assert told["load_mean"] == pytest.approx(told["bits"] / (found["samples"] * 0.1 * found["bitrate"]))
     assert told["periodic"] == 2 * found["samples"]
     assert found["communication"]["good"] == count[0x110] + count[0x120]
 
@@ -233,35 +205,24 @@ def test_signals_and_labels_of_a_run_agree_with_its_result(
     with (out / "signals.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == found["samples"]
-    assert (
-        sum(int(r["event.measurement"]) for r in rows) == found["frames"]["measurement"]
-    )
+    assert sum(int(r["event.measurement"]) for r in rows) == found["frames"]["measurement"]
     assert sum(int(r["bits"]) for r in rows) == found["frames"]["bits"]
     healthy = rows[: found["faults"][0]["start"]]
-    assert max(
-        abs(float(r[f"r1.{i}"])) / float(r[f"J1.{i}"]) for r in healthy for i in (1, 2)
-    ) == pytest.approx(found["margin_max"], rel=1e-6)
+    assert max(abs(float(r[f"r1.{i}"])) / float(r[f"J1.{i}"]) for r in healthy for i in (1, 2)) == pytest.approx(found["margin_max"], rel=1e-6)
     for row in healthy:
         for name in NAMES:
-            assert (
-                abs(float(row[name]) - float(row[f"{name}.value"]))
-                <= float(row[f"{name}.radius"]) * (1 + 1e-6) + 1e-6
-            )
+            assert abs(float(row[name]) - float(row[f"{name}.value"])) <= float(row[f"{name}.radius"]) * (1 + 1e-6) + 1e-6
     first = next(k for k, r in enumerate(rows) if int(r["plant"]) >= 2)
     assert first == found["faults"][0]["detected_at"]
     with (out / "labels.csv").open(newline="", encoding="utf-8") as file:
         labels = list(csv.DictReader(file))
-    assert [
-        (x["start"], x["end"], x["name"], x["kind"], x["signal"]) for x in labels
-    ] == [
+    assert [(x["start"], x["end"], x["name"], x["kind"], x["signal"]) for x in labels] == [
         ("100", "130", "controller2", "bias", "control2_mps2"),
         ("180", "200", "gap12_m", "noise", "gap12_m"),
     ]
 
 
-def test_a_log_gives_the_verdict_changes_of_its_run_again(
-    cli: Cli, finished: tuple[Path, dict[str, Any]]
-) -> None:
+def test_a_log_gives_the_verdict_changes_of_its_run_again(cli: Cli, finished: tuple[Path, dict[str, Any]]) -> None:
     out, found = finished
     told = good(
         cli(
@@ -291,23 +252,15 @@ def test_a_log_gives_the_verdict_changes_of_its_run_again(
 
 @pytest.mark.parametrize("real", ["f32", "f64"])
 @pytest.mark.parametrize("scenario", ["default", "adaptive"])
-def test_a_log_of_any_scenario_and_number_type_gives_its_verdicts_again(
-    cli: Cli, tmp_path: Path, scenario: str, real: str
-) -> None:
+def test_a_log_of_any_scenario_and_number_type_gives_its_verdicts_again(cli: Cli, tmp_path: Path, scenario: str, real: str) -> None:
     some = ("platoon", "--scenario", scenario, "--real", real)
-    found = good(
-        cli("run", *some, "--bus", "inprocess", "--out", tmp_path, "--json", "-q")
-    ).json
-    told = good(
-        cli("detect", *some, "--log", tmp_path / "run.log", "--rest", "--json", "-q")
-    ).json
+    found = good(cli("run", *some, "--bus", "inprocess", "--out", tmp_path, "--json", "-q")).json
+    told = good(cli("detect", *some, "--log", tmp_path / "run.log", "--rest", "--json", "-q")).json
     assert told["verdicts"] == found["verdicts"]
     assert found["real"] == told["real"] == real
 
 
-def test_a_log_without_every_fifth_measurement_is_reported_as_a_broken_bus(
-    cli: Cli, tmp_path: Path
-) -> None:
+def test_a_log_without_every_fifth_measurement_is_reported_as_a_broken_bus(cli: Cli, tmp_path: Path) -> None:
     good(
         cli(
             "run",
@@ -339,9 +292,7 @@ def test_a_log_without_every_fifth_measurement_is_reported_as_a_broken_bus(
             "-q",
         )
     ).json
-    assert told["communication"]["lost"] == len(
-        [i for i in dropped if i < measured[-1]]
-    )
+    assert told["communication"]["lost"] == len([i for i in dropped if i < measured[-1]])
     assert any(v["bus"]["measurement"] == "lossy" for v in told["verdicts"])
     assert all(v["plant"] != "confirmed" for v in told["verdicts"])
 
@@ -429,9 +380,7 @@ def test_lines_for_people_go_to_stderr_when_stdout_carries_json(cli: Cli) -> Non
 # ---- replay ----
 
 
-def test_a_recorded_run_is_replayed_with_the_same_events(
-    cli: Cli, finished: tuple[Path, dict[str, Any]], tmp_path: Path
-) -> None:
+def test_a_recorded_run_is_replayed_with_the_same_events(cli: Cli, finished: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     out, found = finished
     told = good(
         cli(
@@ -451,15 +400,11 @@ def test_a_recorded_run_is_replayed_with_the_same_events(
     assert told["frames"]["measurement"] == found["frames"]["measurement"]
     assert told["scenario"] == "signals.csv"
     assert any(v["plant"] == "confirmed" for v in told["verdicts"])
-    again = good(
-        cli("detect", "platoon", "--log", tmp_path / "run.log", "--json", "-q")
-    ).json
+    again = good(cli("detect", "platoon", "--log", tmp_path / "run.log", "--json", "-q")).json
     assert again["verdicts"] == told["verdicts"]
 
 
-def test_a_fault_in_a_replay_is_found_and_without_it_there_is_none(
-    cli: Cli, tmp_path: Path
-) -> None:
+def test_a_fault_in_a_replay_is_found_and_without_it_there_is_none(cli: Cli, tmp_path: Path) -> None:
     good(
         cli(
             "run",
@@ -485,18 +430,14 @@ def test_a_fault_in_a_replay_is_found_and_without_it_there_is_none(
         "-q",
     )
     good(cli(*base, "--expect", "quiet"))
-    found = good(
-        cli(*base, "--fault", "gap12_m:bias:1.0@120", "--expect", "detect")
-    ).json
+    found = good(cli(*base, "--fault", "gap12_m:bias:1.0@120", "--expect", "detect")).json
     assert found["faults"][0]["delay"] <= 5
 
 
 # ---- design ----
 
 
-def test_a_design_can_be_recomputed_from_what_it_says(
-    cli: Cli, tmp_path: Path, models: Models
-) -> None:
+def test_a_design_can_be_recomputed_from_what_it_says(cli: Cli, tmp_path: Path, models: Models) -> None:
     found = good(cli("design", "platoon", "--out", tmp_path, "--json", "-q")).json
     assert found["model_hash"] == f"{models.design().tables.hash:08x}"
     assert {f.name for f in tmp_path.iterdir()} >= {
@@ -520,12 +461,7 @@ def test_a_design_can_be_recomputed_from_what_it_says(
         atol=1e-6,
     )
     assert all(c["passed"] and c["value"] <= c["limit"] for c in found["checks"])
-    assert {"Luenberger", "all-pass", "bus load"} <= {
-        w
-        for c in found["checks"]
-        for w in ("Luenberger", "all-pass", "bus load")
-        if w in c["name"]
-    }
+    assert {"Luenberger", "all-pass", "bus load"} <= {w for c in found["checks"] for w in ("Luenberger", "all-pass", "bus load") if w in c["name"]}
     assert found["slews"]["gap12_m"][0] == pytest.approx(0.200, abs=5e-4)
     assert found["slews"]["speed1_mps"][0] == pytest.approx(0.563, abs=5e-4)
     assert set(found["generators"][0]["smallest_fault"]) == {
@@ -536,9 +472,7 @@ def test_a_design_can_be_recomputed_from_what_it_says(
     assert found["reused"] is True
 
 
-def test_a_design_with_an_override_does_not_touch_the_shipped_one(
-    cli: Cli, tmp_path: Path
-) -> None:
+def test_a_design_with_an_override_does_not_touch_the_shipped_one(cli: Cli, tmp_path: Path) -> None:
     beside = ROOT / "host_tools" / "models" / "platoon.design.toml"
     before = beside.read_bytes()
     found = good(
@@ -590,9 +524,7 @@ def test_a_campaign_says_all_that_the_design_promises(cli: Cli, tmp_path: Path) 
     assert found["delay_mean"] == pytest.approx(np.mean(delays))
     assert found["delay_max"] == max(delays)
     assert found["detected_runs"] == found["confirmed_runs"] == 8
-    assert found["measurement_share"] == pytest.approx(
-        sum(r["measurement"] for r in found["rows"]) / 1600
-    )
+    assert found["measurement_share"] == pytest.approx(sum(r["measurement"] for r in found["rows"]) / 1600)
     assert found["frames_lost"] == sum(r["lost"] for r in found["rows"]) > 0
 
 
@@ -614,9 +546,7 @@ def test_a_quiet_campaign_meets_its_expectation(cli: Cli) -> None:
     )
 
 
-def test_a_report_is_drawn_again_from_the_files_of_a_run(
-    cli: Cli, finished: tuple[Path, dict[str, Any]], tmp_path: Path
-) -> None:
+def test_a_report_is_drawn_again_from_the_files_of_a_run(cli: Cli, finished: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     out, _ = finished
     for name in ("run.json", "signals.csv", "labels.csv"):
         (tmp_path / name).write_bytes((out / name).read_bytes())

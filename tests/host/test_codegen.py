@@ -342,9 +342,7 @@ def changed_places(d: Design) -> Design:
             zero=20000,
         ),
     )
-    return replace(
-        d, tables=replace(d.tables, groups=(replace(first, signals=signals), *rest))
-    )
+    return replace(d, tables=replace(d.tables, groups=(replace(first, signals=signals), *rest)))
 
 
 @pytest.fixture(scope="module")
@@ -451,9 +449,7 @@ def built(
                 *map(str, objects[r]),
             ]
             subprocess.run([*command, "-o", str(out / f"{program}_{r}")], check=True)
-    database = cantools.database.load_string(
-        (out / f"{name}.dbc").read_text(encoding="ascii"), "dbc", strict=True
-    )
+    database = cantools.database.load_string((out / f"{name}.dbc").read_text(encoding="ascii"), "dbc", strict=True)
     assert isinstance(database, Database)
     return Built(d, out, database)
 
@@ -462,32 +458,20 @@ def built(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_same_design_gives_the_same_bytes(
-    designs: dict[str, Design], name: str
-) -> None:
+def test_the_same_design_gives_the_same_bytes(designs: dict[str, Design], name: str) -> None:
     again = design(load_model("platoon"))[0] if name == "platoon" else designs[name]
     assert emit_c(designs[name]) == emit_c(again)
     assert emit_dbc(designs[name]) == emit_dbc(again)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_text_is_plain_and_says_where_it_comes_from(
-    designs: dict[str, Design], name: str
-) -> None:
+def test_text_is_plain_and_says_where_it_comes_from(designs: dict[str, Design], name: str) -> None:
     d = designs[name]
     for text in (*emit_c(d), emit_dbc(d)):
         assert text.isascii() and text.endswith("\n")
-        assert (
-            d.model.sha256 in text
-            and f"0x{d.tables.hash:08X}" in text
-            and f"{d.tables.name}.design.toml" in text
-        )
+        assert d.model.sha256 in text and f"0x{d.tables.hash:08X}" in text and f"{d.tables.name}.design.toml" in text
         assert "do not edit" in text
-        assert (
-            str(ROOT) not in text
-            and "/" + "tmp" not in text
-            and not re.search(r"20\d\d-\d\d", text)
-        )
+        assert str(ROOT) not in text and "/" + "tmp" not in text and not re.search(r"20\d\d-\d\d", text)
     for text in emit_c(d):
         assert max(map(len, text.splitlines())) <= 140
         assert not re.search(r"[ \t]$", text, re.MULTILINE)
@@ -499,14 +483,10 @@ def test_shipped_files_are_those_of_the_shipped_model(
     header, source = emit_c(designs["platoon"])
     assert (MODELS / "platoon.h").read_text(encoding="ascii") == header
     assert (MODELS / "platoon.c").read_text(encoding="ascii") == source
-    assert (MODELS / "platoon.dbc").read_text(encoding="ascii") == emit_dbc(
-        designs["platoon"]
-    )
+    assert (MODELS / "platoon.dbc").read_text(encoding="ascii") == emit_dbc(designs["platoon"])
 
 
-def test_files_are_written_only_when_they_change(
-    designs: dict[str, Design], tmp_path: Path
-) -> None:
+def test_files_are_written_only_when_they_change(designs: dict[str, Design], tmp_path: Path) -> None:
     d = designs["tank"]
     assert [p.name for p in write_all(d, tmp_path)] == ["tank.h", "tank.c", "tank.dbc"]
     before = {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
@@ -537,9 +517,7 @@ def test_literals_are_exact() -> None:
 def test_long_rows_are_spread_evenly() -> None:
     lines = fill([f"HG_REAL_C(0x1.{i:06x}p-10)" for i in range(13)])
     assert max(map(len, lines)) <= 140
-    assert {line.count("HG_REAL_C") for line in lines[:-1]} == {
-        lines[0].count("HG_REAL_C")
-    }
+    assert {line.count("HG_REAL_C") for line in lines[:-1]} == {lines[0].count("HG_REAL_C")}
     assert sum(line.count("HG_REAL_C") for line in lines) == 13
 
 
@@ -550,9 +528,7 @@ def test_long_rows_are_spread_evenly() -> None:
         ("Measure-ment", "'Measure-ment' have the same identifier"),
     ],
 )
-def test_names_that_would_collide_are_refused(
-    designs: dict[str, Design], group: str, message: str
-) -> None:
+def test_names_that_would_collide_are_refused(designs: dict[str, Design], group: str, message: str) -> None:
     d = designs["platoon"]
     first, second = d.tables.groups
     both = (replace(first, name="measure ment"), replace(second, name=group))
@@ -569,9 +545,7 @@ def test_a_signal_named_like_a_constant_is_refused(designs: dict[str, Design]) -
         emit_c(
             replace(
                 d,
-                tables=replace(
-                    d.tables, groups=(replace(first, signals=signals), second)
-                ),
+                tables=replace(d.tables, groups=(replace(first, signals=signals), second)),
             )
         )
 
@@ -582,9 +556,7 @@ def test_a_signal_named_like_a_constant_is_refused(designs: dict[str, Design]) -
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("number", REALS)
 @pytest.mark.parametrize("name", NAMES)
-def test_compiles_without_a_warning(
-    designs: dict[str, Design], tmp_path: Path, name: str, number: str, compiler: str
-) -> None:
+def test_compiles_without_a_warning(designs: dict[str, Design], tmp_path: Path, name: str, number: str, compiler: str) -> None:
     d = designs[name]
     write_all(d, tmp_path)
     model = d.tables.name
@@ -630,9 +602,7 @@ def test_header_is_cpp_too(designs: dict[str, Design], tmp_path: Path) -> None:
         ("HG_GENERATORS_MAX", 2),
     ],
 )
-def test_too_small_a_limit_is_an_error_that_names_it(
-    designs: dict[str, Design], tmp_path: Path, limit: str, least: int
-) -> None:
+def test_too_small_a_limit_is_an_error_that_names_it(designs: dict[str, Design], tmp_path: Path, limit: str, least: int) -> None:
     write_all(designs["tank"], tmp_path)
     command = [
         "gcc",
@@ -664,21 +634,11 @@ def _each(tag: str, values: object) -> Numbers:
 
 
 def _message(m: MessageTable, signals: tuple[SignalTable, ...]) -> Numbers:
-    numbers = [
-        p for key in ("id", "flags", "length") for p in _each(key, getattr(m, key))
-    ]
+    numbers = [p for key in ("id", "flags", "length") for p in _each(key, getattr(m, key))]
     numbers += _each("width", len(signals)) + _each("data_id", m.data_id)
     for s in signals:
-        numbers += (
-            _each("start", s.start)
-            + _each("bits", s.length)
-            + _each("field_flags", s.flags)
-        )
-        numbers += [
-            p
-            for key in ("resolution", "offset", "per_unit", "minimum", "maximum")
-            for p in _each(key, getattr(s, key))
-        ]
+        numbers += _each("start", s.start) + _each("bits", s.length) + _each("field_flags", s.flags)
+        numbers += [p for key in ("resolution", "offset", "per_unit", "minimum", "maximum") for p in _each(key, getattr(s, key))]
     return numbers
 
 
@@ -697,16 +657,8 @@ def _group(g: GroupTable) -> Numbers:
         )
         for p in _each(key, getattr(g, key))
     ]
-    numbers += (
-        _each("zero", tuple(s.zero for s in g.signals))
-        + _each("half", tuple(s.half for s in g.signals))
-        + _each("slew", g.slew)
-    )
-    return (
-        numbers
-        + _each("span", tuple(s.span for s in g.signals))
-        + _each("middle", tuple(s.middle for s in g.signals))
-    )
+    numbers += _each("zero", tuple(s.zero for s in g.signals)) + _each("half", tuple(s.half for s in g.signals)) + _each("slew", g.slew)
+    return numbers + _each("span", tuple(s.span for s in g.signals)) + _each("middle", tuple(s.middle for s in g.signals))
 
 
 def expected_numbers(d: Design) -> Numbers:
@@ -717,20 +669,10 @@ def expected_numbers(d: Design) -> Numbers:
         numbers += _group(g)
     numbers += _each("generators", len(t.generators))
     for e in t.generators:
-        numbers += (
-            _each("order", len(e.state))
-            + _each("residuals", len(e.output))
-            + _each("width", len(e.signal))
-            + _each("signal", e.signal)
-        )
+        numbers += _each("order", len(e.state)) + _each("residuals", len(e.output)) + _each("width", len(e.signal)) + _each("signal", e.signal)
         for key in ("state", "input", "output", "direct"):
             m = getattr(e, key)
-            numbers += (
-                _each("rows", len(m))
-                + _each("cols", len(m[0]))
-                + _each("exponent", 0)
-                + _each(key, m)
-            )
+            numbers += _each("rows", len(m)) + _each("cols", len(m[0])) + _each("exponent", 0) + _each(key, m)
         numbers += _each("same", 1)
         for key in (
             "taps",
@@ -746,28 +688,11 @@ def expected_numbers(d: Design) -> Numbers:
         ):
             numbers += _each(key, getattr(e, key))
     numbers += _each("decisions", len(t.generators))
-    numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each(
-        "faults", tuple(e.faults for e in t.generators)
-    )
-    numbers += (
-        _each("up", t.up)
-        + _each("down", t.down)
-        + _each("latch", int(t.latch))
-        + _each("history", t.history)
-        + _each("all_residuals", t.residuals)
-    )
-    numbers += _each("codes", 2 * t.signals) + [
-        (tag, float(detector_reals(t))) for tag in ("reals", "needed", "stored")
-    ]
-    numbers += (
-        _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
-    )
-    return (
-        numbers
-        + _each("heartbeat", t.heartbeat)
-        + _each("hash", t.hash)
-        + [("node", 1.0), ("null", 1.0), ("senders", 1.0), ("null", 1.0)]
-    )
+    numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each("faults", tuple(e.faults for e in t.generators))
+    numbers += _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("all_residuals", t.residuals)
+    numbers += _each("codes", 2 * t.signals) + [(tag, float(detector_reals(t))) for tag in ("reals", "needed", "stored")]
+    numbers += _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
+    return numbers + _each("heartbeat", t.heartbeat) + _each("hash", t.hash) + [("node", 1.0), ("null", 1.0), ("senders", 1.0), ("null", 1.0)]
 
 
 @pytest.mark.parametrize("number", REALS)
@@ -790,9 +715,7 @@ def _sent_value(s: SignalTable, code: int) -> float:
 
 
 def _by_id(database: Database, g: GroupTable) -> Message:
-    return database.get_message_by_frame_id(
-        g.message.id, force_extended_id=bool(g.message.flags & EXTENDED)
-    )
+    return database.get_message_by_frame_id(g.message.id, force_extended_id=bool(g.message.flags & EXTENDED))
 
 
 def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
@@ -802,26 +725,16 @@ def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
     for _ in range(200):
         for i, g in enumerate(tables.groups):
             ends = dice.random() < 0.1
-            codes = [
-                dice.choice((s.minimum, s.maximum))
-                if ends
-                else dice.randint(s.minimum, s.maximum)
-                for s in g.signals
-            ]
+            codes = [dice.choice((s.minimum, s.maximum)) if ends else dice.randint(s.minimum, s.maximum) for s in g.signals]
             asked.append((i, dice.randrange(16), dice.randrange(16), codes))
-    given = "".join(
-        f"{i} {c} {k} {' '.join(map(str, codes))}\n" for i, c, k, codes in asked
-    )
+    given = "".join(f"{i} {c} {k} {' '.join(map(str, codes))}\n" for i, c, k, codes in asked)
     answers = built.run("probe_f32", given=given)
     assert len(answers) == len(asked)
     for (i, counter, stamp, codes), answer in zip(asked, answers, strict=True):
         g, words = tables.groups[i], answer.split()
         data, message = bytes.fromhex(words[0]), _by_id(built.database, g)
         assert [int(w) for w in words[1 : 1 + len(codes)]] == codes
-        signals = {
-            s.name: _sent_value(s, code)
-            for s, code in zip(g.signals, codes, strict=True)
-        }
+        signals = {s.name: _sent_value(s, code) for s, code in zip(g.signals, codes, strict=True)}
         header: dict[str, float] = {
             "E2E_CRC": data[0],
             "E2E_counter": counter,
@@ -837,34 +750,24 @@ def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
         )
         raw = message.decode(data, scaling=False)
         assert isinstance(raw, dict)
-        for s, code, value in zip(
-            g.signals, codes, words[1 + len(codes) :], strict=True
-        ):
+        for s, code, value in zip(g.signals, codes, words[1 + len(codes) :], strict=True):
             if not s.flags & FLOAT32:
                 assert raw[s.name] == code
             physical = read[s.name]
             assert isinstance(physical, (int, float))
-            assert abs(physical - float.fromhex(value)) <= 2.0**-22 * max(
-                abs(physical), abs(s.offset), s.resolution
-            )
+            assert abs(physical - float.fromhex(value)) <= 2.0**-22 * max(abs(physical), abs(s.offset), s.resolution)
             assert round((physical - s.offset) / s.resolution) == code
 
 
 def test_no_value_reads_as_invalid(built: Built) -> None:
     invalid = -(2**31)
     for i, g in enumerate(built.design.tables.groups):
-        answer = built.run(
-            "probe_f32", given=f"{i} 0 0 {' '.join([str(invalid)] * len(g.signals))}\n"
-        )[0]
+        answer = built.run("probe_f32", given=f"{i} 0 0 {' '.join([str(invalid)] * len(g.signals))}\n")[0]
         read = _by_id(built.database, g).decode(bytes.fromhex(answer.split()[0]))
         assert isinstance(read, dict)
         for s in g.signals:
             value = read[s.name]
-            assert (
-                np.isnan(float(str(value)))
-                if s.flags & FLOAT32
-                else str(value) == "invalid"
-            )
+            assert np.isnan(float(str(value))) if s.flags & FLOAT32 else str(value) == "invalid"
 
 
 def test_dbc_says_how_frames_are_sent(built: Built) -> None:
@@ -883,37 +786,23 @@ def test_dbc_says_how_frames_are_sent(built: Built) -> None:
         assert m.senders == [f"{m.name}_sender"]
         attributes = {key: a.value for key, a in m.dbc.attributes.items()}
         assert attributes["E2EProfile"] == 1
-        assert (
-            tuple(int(x, 16) for x in str(attributes["E2EDataIdList"]).split())
-            == g.message.data_id
-        )
-        assert attributes["VFrameFormat"] == (14 if g.message.flags & FD else 0) + (
-            1 if g.message.flags & EXTENDED else 0
-        )
+        assert tuple(int(x, 16) for x in str(attributes["E2EDataIdList"]).split()) == g.message.data_id
+        assert attributes["VFrameFormat"] == (14 if g.message.flags & FD else 0) + (1 if g.message.flags & EXTENDED else 0)
         assert ("closes the sample" in str(m.comment)) == (place == tables.closing)
         for s in g.signals:
             found = m.get_signal_by_name(s.name)
             assert found.conversion.is_float == bool(s.flags & FLOAT32)
-            assert found.byte_order == (
-                "big_endian" if s.flags & MOTOROLA else "little_endian"
-            )
+            assert found.byte_order == ("big_endian" if s.flags & MOTOROLA else "little_endian")
             assert (found.start, found.length, found.unit) == (
                 s.start,
                 s.length,
                 UNITS[s.name.rsplit("_", 1)[1]],
             )
-            assert found.minimum == pytest.approx(
-                s.offset + s.minimum * s.resolution, rel=1e-6
-            )
-            assert found.maximum == pytest.approx(
-                s.offset + s.maximum * s.resolution, rel=1e-6
-            )
+            assert found.minimum == pytest.approx(s.offset + s.minimum * s.resolution, rel=1e-6)
+            assert found.maximum == pytest.approx(s.offset + s.maximum * s.resolution, rel=1e-6)
             if not s.flags & FLOAT32:
                 assert found.is_signed == bool(s.flags & SIGNED)
-                assert (
-                    np.float32(found.scale) == s.resolution
-                    and np.float32(found.offset) == s.offset
-                )
+                assert np.float32(found.scale) == s.resolution and np.float32(found.offset) == s.offset
     nodes = {n.name for n in built.database.nodes}
     assert nodes == {
         "detector",
@@ -929,27 +818,15 @@ def test_verdict_and_status_read_as_the_node_wrote_them(built: Built) -> None:
         tables.status.id,
         tables.verdict.id,
     ]
-    first, status, reply = (
-        database.decode_message(int(i), bytes.fromhex(data)) for data, i in lines
-    )
-    assert (
-        isinstance(first, dict) and isinstance(status, dict) and isinstance(reply, dict)
-    )
+    first, status, reply = (database.decode_message(int(i), bytes.fromhex(data)) for data, i in lines)
+    assert isinstance(first, dict) and isinstance(status, dict) and isinstance(reply, dict)
     verdict = database.get_message_by_frame_id(tables.verdict.id)
     faults = [s.name for s in verdict.signals if s.name.startswith("fault_")]
     buses = [s.name for s in verdict.signals if s.name.startswith("bus_")]
-    assert len(faults) == len(built.design.model.faults) and len(buses) == len(
-        tables.groups
-    )
-    assert (
-        str(first["plant"]) == "confirmed"
-        and str(first["basis"]) == "set"
-        and str(first["refused"]) == "yes"
-    )
+    assert len(faults) == len(built.design.model.faults) and len(buses) == len(tables.groups)
+    assert str(first["plant"]) == "confirmed" and str(first["basis"]) == "set" and str(first["refused"]) == "yes"
     assert [str(first[f]) for f in faults] == ["candidate"] + ["no"] * (len(faults) - 1)
-    assert [str(first[b]) for b in buses] == ["stale", "lossy", "good"][
-        : len(buses)
-    ]  # 0x1B, two bits each
+    assert [str(first[b]) for b in buses] == ["stale", "lossy", "good"][: len(buses)]  # 0x1B, two bits each
     assert int(str(first["sample_high"])) + int(str(first["E2E_stamp"])) == 0xABC
     assert (str(first["reply"]), str(reply["reply"])) == ("no", "yes")
     assert (first["E2E_counter"], reply["E2E_counter"]) == (0, 1)

@@ -24,22 +24,15 @@ PLANTS = 25
 def twins_hold(trace: dict[str, Any], places: list[int], first: int) -> None:
     """Every reading lies within its twin's radius, which is never wider than the held one's."""
     own, twin = places, list(range(first, first + len(places)))
-    assert np.all(
-        np.abs(trace["reading"][:, own] - trace["value"][:, twin])
-        <= trace["radius"][:, twin] * (1 + 1e-6)
-    )
+    assert np.all(np.abs(trace["reading"][:, own] - trace["value"][:, twin]) <= trace["radius"][:, twin] * (1 + 1e-6))
     assert np.all(trace["radius"][:, twin] <= trace["radius"][:, own])
 
 
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("silence", [0, 2])
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_predictions_are_true_and_tighter(
-    models: Models, real: str, silence: int, loss: float
-) -> None:
-    ready = models.platoon(
-        "manoeuvres", PREDICTED | (SILENT_2 if silence else {}), real
-    )
+def test_predictions_are_true_and_tighter(models: Models, real: str, silence: int, loss: float) -> None:
+    ready = models.platoon("manoeuvres", PREDICTED | (SILENT_2 if silence else {}), real)
     tighter = 0
     for run in range(10):
         trace = ready.batch(300, loss=loss).trace(run)
@@ -50,12 +43,8 @@ def test_predictions_are_true_and_tighter(
 
 
 @pytest.mark.parametrize("real", REALS)
-@pytest.mark.parametrize(
-    "overrides", [{}, SILENT_2], ids=["no silent time", "two silent samples"]
-)
-def test_no_false_alarm_with_prediction(
-    models: Models, real: str, overrides: dict[str, Any]
-) -> None:
+@pytest.mark.parametrize("overrides", [{}, SILENT_2], ids=["no silent time", "two silent samples"])
+def test_no_false_alarm_with_prediction(models: Models, real: str, overrides: dict[str, Any]) -> None:
     ready = models.platoon("manoeuvres", PREDICTED | overrides, real)
     assert alarms(ready.batch(200).runs(0, 300)) == Alarms(0, 0)
     lossy = ready.batch(200, loss=0.2).runs(0, 300)
@@ -64,11 +53,7 @@ def test_no_false_alarm_with_prediction(
 
 
 def delay(models: Models, overrides: dict[str, Any]) -> float:
-    rows = (
-        models.platoon("manoeuvres", overrides)
-        .batch(220, ("controller2:bias:1.0@100",), seed=12)
-        .runs(0, 100)
-    )
+    rows = models.platoon("manoeuvres", overrides).batch(220, ("controller2:bias:1.0@100",), seed=12).runs(0, 100)
     assert all(r["provisional_at"] >= 0 for r in rows)
     return float(np.mean([r["provisional_at"] - 100 for r in rows]))
 
@@ -96,11 +81,7 @@ def test_predictions_of_random_plants_are_true_and_raise_no_alarm() -> None:
             continue
         made += 1
         native = Native(library("f32"), found.tables)
-        places = [
-            g
-            for p in found.tables.predictors
-            for g in range(p.first, p.first + len(p.output))
-        ]
+        places = [g for p in found.tables.predictors for g in range(p.first, p.first + len(p.output))]
         for how, reference in (("corners", "rest"), ("random", "mixed")):
             rng = np.random.default_rng([SEED, number, 1])
             options: dict[str, Any] = {}
@@ -121,12 +102,7 @@ def test_predictions_of_random_plants_are_true_and_raise_no_alarm() -> None:
             )
             trace = batch.trace(0)
             twins_hold(trace, places, found.tables.signals)
-            tighter += int(
-                np.sum(
-                    trace["radius"][:, found.tables.signals :]
-                    < trace["radius"][:, places]
-                )
-            )
+            tighter += int(np.sum(trace["radius"][:, found.tables.signals :] < trace["radius"][:, places]))
             assert alarms(batch.runs(0, 10)) == Alarms(0, 0), f"plant {number}"
         lossy = Batch(
             native,
@@ -143,36 +119,22 @@ def test_predictions_of_random_plants_are_true_and_raise_no_alarm() -> None:
 
 
 # A prediction that goes on after an input was lost, or before it has settled, must not go unnoticed.
-HASTY = {
-    "predict.c": [("self->sure = self->k >= config->settle;", "self->sure = true;")]
-}
+HASTY = {"predict.c": [("self->sure = self->k >= config->settle;", "self->sure = true;")]}
 
 
-def test_a_prediction_that_does_not_wait_is_wrong(
-    models: Models, tmp_path: Any
-) -> None:
-    ready = models.platoon(
-        "manoeuvres", PREDICTED, lib=build_library(tmp_path, "f32", HASTY)
-    )
+def test_a_prediction_that_does_not_wait_is_wrong(models: Models, tmp_path: Any) -> None:
+    ready = models.platoon("manoeuvres", PREDICTED, lib=build_library(tmp_path, "f32", HASTY))
     wrong = 0
     for run in range(20):
         trace = ready.batch(60).trace(run)
-        wrong += int(
-            np.sum(
-                np.abs(trace["reading"][:, :3] - trace["value"][:, TWINS])
-                > trace["radius"][:, TWINS] * 1.01
-            )
-        )
+        wrong += int(np.sum(np.abs(trace["reading"][:, :3] - trace["value"][:, TWINS]) > trace["radius"][:, TWINS] * 1.01))
     assert wrong > 0
 
 
 def test_a_plant_whose_hidden_part_does_not_forget_is_refused() -> None:
     model = load_model(
         "platoon",
-        PREDICTED
-        | {"plant.drag_per_s": 0.0, "plant.feedback.state_weights": [1, 10, 1, 10, 1]},
+        PREDICTED | {"plant.drag_per_s": 0.0, "plant.feedback.state_weights": [1, 10, 1, 10, 1]},
     )
-    with pytest.raises(
-        InputError, match=r"detector\.prediction.*not stable.*remove it"
-    ):
+    with pytest.raises(InputError, match=r"detector\.prediction.*not stable.*remove it"):
         design(model, fresh=True)

@@ -79,9 +79,7 @@ SCALAR: dict[str, Any] = {
 LOOP = {"gain": [[0.5]], "reference_bound": 1.0}
 
 
-def scalar(
-    plant: dict[str, Any] | None = None, signals: list[dict[str, Any]] | None = None
-) -> Model:
+def scalar(plant: dict[str, Any] | None = None, signals: list[dict[str, Any]] | None = None) -> Model:
     """The scalar model with some of its keys replaced."""
     data = copy.deepcopy(SCALAR)
     data["plant"] |= plant or {}
@@ -161,9 +159,7 @@ def test_a_model_without_faults_is_designed() -> None:
     assert bare.generators[0].smallest.size == 0
 
 
-def frames_of(
-    platoon: tuple[Design, Native], seed: int, count: int
-) -> list[tuple[int, Any]]:
+def frames_of(platoon: tuple[Design, Native], seed: int, count: int) -> list[tuple[int, Any]]:
     """All frames of a healthy drive, each with its sample."""
     shipped, native = platoon
     plant, sender = (
@@ -173,17 +169,13 @@ def frames_of(
     frames = []
     for k in range(count):
         reading = plant.read()
-        frames += [
-            (k, f) for g in (0, 1) if (f := sender.step(g, k, reading)) is not None
-        ]
+        frames += [(k, f) for g in (0, 1) if (f := sender.step(g, k, reading)) is not None]
         plant.move()
     return frames
 
 
 @pytest.mark.parametrize("length", [8, 15, 16, 17, 31, 32])
-def test_a_hole_in_a_log_is_an_outage_and_no_fault(
-    platoon: tuple[Design, Native], length: int
-) -> None:
+def test_a_hole_in_a_log_is_an_outage_and_no_fault(platoon: tuple[Design, Native], length: int) -> None:
     """Stamp and counter wrap at 16: after such a hole only the time stamps tell that samples are missing."""
     confirmed = []
     for seed in range(3):
@@ -194,9 +186,7 @@ def test_a_hole_in_a_log_is_an_outage_and_no_fault(
             for k, frame in frames:
                 if not hole <= k < hole + length:
                     detector.take(frame, 0.1 * k)
-            confirmed += (
-                [(seed, hole)] if any(v.plant == "confirmed" for v in verdicts) else []
-            )
+            confirmed += [(seed, hole)] if any(v.plant == "confirmed" for v in verdicts) else []
             assert detector.outages == 1 or length == 8
     assert confirmed == []
 
@@ -223,21 +213,13 @@ def test_a_tick_sender_that_begins_anew_is_no_fault(
                     reading = plant.read()
                     off = at <= k < at + down
                     for sender, group in ((senders, 0), (ticks, 1)):
-                        frame = (
-                            None
-                            if off and group == 1
-                            else sender.step(group, k - begun, reading)
-                        )
+                        frame = None if off and group == 1 else sender.step(group, k - begun, reading)
                         if frame is not None:
                             node.receive(frame)
                     if off:
                         node.overdue()
                     while (verdict := node.step()) is not None:
-                        confirmed += (
-                            [(at, down, seed, k)]
-                            if verdict.plant == "confirmed"
-                            else []
-                        )
+                        confirmed += [(at, down, seed, k)] if verdict.plant == "confirmed" else []
                     plant.move()
     assert confirmed == []
 

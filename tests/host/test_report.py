@@ -115,16 +115,8 @@ def make_run(
     for g, (name, members) in enumerate(groups):
         readings = []
         for _ in members:
-            wave = sum(
-                rng.uniform(0.2, 1.0)
-                * np.sin(t / rng.uniform(0.8, 6.0) + rng.uniform(0, 6))
-                for _ in range(3)
-            )
-            readings.append(
-                wave
-                + 0.01 * rng.uniform(-1, 1, samples)
-                + (0.3 * fault if place == 0 else 0.0)
-            )
+            wave = sum(rng.uniform(0.2, 1.0) * np.sin(t / rng.uniform(0.8, 6.0) + rng.uniform(0, 6)) for _ in range(3))
+            readings.append(wave + 0.01 * rng.uniform(-1, 1, samples) + (0.3 * fault if place == 0 else 0.0))
             place += 1
         y = np.array(readings).T
         event, held, value, radius, last = (
@@ -136,13 +128,7 @@ def make_run(
         )
         for k in range(samples):
             lost = stale is not None and stale[0] <= k < stale[1] and g == 0
-            if g == len(groups) - 1 or (
-                not lost
-                and (
-                    k - last >= 5
-                    or np.any(np.abs(y[k] - held) > 0.05 * np.abs(held) + 0.05)
-                )
-            ):
+            if g == len(groups) - 1 or (not lost and (k - last >= 5 or np.any(np.abs(y[k] - held) > 0.05 * np.abs(held) + 0.05))):
                 held, last, event[k] = y[k].copy(), k, 1.0
                 radius[k] = 0.0005
             else:
@@ -162,14 +148,8 @@ def make_run(
     for g in range(1, generators + 1):
         for i in range(1, residuals + 1):
             noise = np.convolve(rng.uniform(-1, 1, samples), taps)[:samples] * 0.5
-            response = np.convolve(fault, taps)[:samples] * (
-                2.2 if (g, i) == (1, min(2, residuals)) else 0.15
-            )
-            J = (
-                3.0
-                + np.convolve(radius_sum, taps)[:samples] * 3.0
-                + 60 * 0.7 ** np.arange(samples)
-            )
+            response = np.convolve(fault, taps)[:samples] * (2.2 if (g, i) == (1, min(2, residuals)) else 0.15)
+            J = 3.0 + np.convolve(radius_sum, taps)[:samples] * 3.0 + 60 * 0.7 ** np.arange(samples)
             r = np.clip(noise, -0.8 * J, 0.8 * J) + response
             column |= {f"r{g}.{i}": r, f"J{g}.{i}": J}
             worst = np.maximum(worst, np.abs(r) / J)
@@ -184,29 +164,18 @@ def make_run(
             plant[at : at + 2] = 2
         found.append((start, end, at))
     column["plant"] = plant
-    bits = sum((e * 120 for e in events.values()), np.zeros(samples)) + 111 * (
-        np.arange(samples) % 10 == 0
-    )
+    bits = sum((e * 120 for e in events.values()), np.zeros(samples)) + 111 * (np.arange(samples) % 10 == 0)
     for name, e in events.items():
         column[f"event.{name}"] = e
     column["bits"] = bits
     names = list(column)
     rows = [",".join(f"{column[n][k]:.9g}" for n in names) for k in range(samples)]
-    (directory / "signals.csv").write_text(
-        ",".join(names) + "\n" + "\n".join(rows) + "\n"
-    )
+    (directory / "signals.csv").write_text(",".join(names) + "\n" + "\n".join(rows) + "\n")
 
     words = ("starting", "none", "provisional", "confirmed")
     verdicts: list[dict[str, Any]] = []
     for k in range(samples):
-        health = {
-            name: "absent"
-            if k < 1
-            else "stale"
-            if stale and stale[0] + 9 <= k < stale[1] and i == 0
-            else "good"
-            for i, name in enumerate(events)
-        }
+        health = {name: "absent" if k < 1 else "stale" if stale and stale[0] + 9 <= k < stale[1] and i == 0 else "good" for i, name in enumerate(events)}
         entry = {"k": k, "plant": words[plant[k]], "bus": health}
         if not verdicts or (entry["plant"], health) != (
             verdicts[-1]["plant"],
@@ -269,17 +238,12 @@ def make_run(
         "verdicts": verdicts,
     }
     (directory / "run.json").write_text(json.dumps(info))
-    labels = ["start,end,name,kind,size,signal"] + [
-        f"{s},{e if e else ''},{first},bias,{size},{first}" for s, e, size in faults
-    ]
+    labels = ["start,end,name,kind,size,signal"] + [f"{s},{e if e else ''},{first},bias,{size},{first}" for s, e, size in faults]
     (directory / "labels.csv").write_text("\n".join(labels) + "\n")
     return info
 
 
-LARGE = tuple(
-    (f"car{i}", (f"speed{i}_mps", f"gap{i}_m", f"acceleration{i}_mps2"))
-    for i in range(1, 6)
-)
+LARGE = tuple((f"car{i}", (f"speed{i}_mps", f"gap{i}_m", f"acceleration{i}_mps2")) for i in range(1, 6))
 
 
 def test_small_run(tmp_path: Path) -> None:
@@ -328,14 +292,8 @@ def test_small_run(tmp_path: Path) -> None:
 def test_same_input_same_bytes(tmp_path: Path) -> None:
     make_run(tmp_path / "a")
     shutil.copytree(tmp_path / "a", tmp_path / "b")
-    assert (
-        write_run_report(tmp_path / "a").read_bytes()
-        == write_run_report(tmp_path / "b").read_bytes()
-    )
-    assert (
-        write_picture(tmp_path / "a", tmp_path / "a.png").read_bytes()
-        == write_picture(tmp_path / "b", tmp_path / "b.png").read_bytes()
-    )
+    assert write_run_report(tmp_path / "a").read_bytes() == write_run_report(tmp_path / "b").read_bytes()
+    assert write_picture(tmp_path / "a", tmp_path / "a.png").read_bytes() == write_picture(tmp_path / "b", tmp_path / "b.png").read_bytes()
 
 
 def test_large_run(tmp_path: Path) -> None:
@@ -360,10 +318,7 @@ def test_no_faults(tmp_path: Path) -> None:
 
 def test_false_alarms(tmp_path: Path) -> None:
     make_run(tmp_path, 120, faults=(), alarms=(2, 1))
-    assert (
-        headline(read_run(tmp_path))
-        == "No fault was injected; 1 confirmed and 2 provisional false alarms."
-    )
+    assert headline(read_run(tmp_path)) == "No fault was injected; 1 confirmed and 2 provisional false alarms."
     assert "1 confirmed, 2 provisional" in check_html(write_run_report(tmp_path))[0]
 
 
@@ -393,11 +348,7 @@ def test_picture(tmp_path: Path) -> None:
 def test_markup_in_names_is_text(tmp_path: Path) -> None:
     make_run(tmp_path)
     path = tmp_path / "run.json"
-    path.write_text(
-        path.read_text().replace(
-            '"scenario": "default"', '"scenario": "<script>alert(1)</script>"'
-        )
-    )
+    path.write_text(path.read_text().replace('"scenario": "default"', '"scenario": "<script>alert(1)</script>"'))
     assert "<script>alert(1)</script>" in check_html(write_run_report(tmp_path))[0]
 
 
@@ -439,10 +390,7 @@ def without(column: str) -> Callable[[list[str]], list[str]]:
 
     def apply(lines: list[str]) -> list[str]:
         place = lines[0].split(",").index(column)
-        return [
-            ",".join(f for i, f in enumerate(line.split(",")) if i != place)
-            for line in lines
-        ]
+        return [",".join(f for i, f in enumerate(line.split(",")) if i != place) for line in lines]
 
     return apply
 
@@ -469,9 +417,7 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "empty csv": (lambda d: _put(d / "signals.csv", ""), r"signals\.csv: empty"),
     "only names": (edit_csv(lambda lines: lines[:1]), r"signals\.csv: no samples"),
     "word in csv": (
-        edit_csv(
-            lambda lines: [*lines[:5], lines[5].replace(",", ",abc", 1), *lines[6:]]
-        ),
+        edit_csv(lambda lines: [*lines[:5], lines[5].replace(",", ",abc", 1), *lines[6:]]),
         r"signals\.csv: line 6, column 'k': 'abc5?4?' is not a number",
     ),
     "short line": (
@@ -516,9 +462,7 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
         r"labels\.csv: column 'end' is missing",
     ),
     "label start": (
-        lambda d: _put(
-            d / "labels.csv", "start,end,name,kind,size,signal\nsoon,,x,bias,1,x\n"
-        ),
+        lambda d: _put(d / "labels.csv", "start,end,name,kind,size,signal\nsoon,,x,bias,1,x\n"),
         r"labels\.csv: start 'soon' is not a sample",
     ),
 }
@@ -575,9 +519,7 @@ def test_design_report(tmp_path: Path, platoon: Design) -> None:
     assert path.read_bytes() == (tmp_path / "again.html").read_bytes()
 
 
-def test_design_report_says_when_it_was_regularised(
-    tmp_path: Path, platoon: Design
-) -> None:
+def test_design_report_says_when_it_was_regularised(tmp_path: Path, platoon: Design) -> None:
     g = platoon.generators[0]
     changed = replace(
         g,
@@ -588,9 +530,7 @@ def test_design_report_says_when_it_was_regularised(
         platoon.stored,
         observers=(replace(platoon.stored.observers[0], regularised=1e-6),),
     )
-    write_design_report(
-        replace(platoon, generators=(changed,), stored=stored), tmp_path / "d.html"
-    )
+    write_design_report(replace(platoon, generators=(changed,), stored=stored), tmp_path / "d.html")
     text, _ = check_html(tmp_path / "d.html")
     assert "regularised" in text and "∞" in text
 
@@ -614,9 +554,7 @@ def run_live(table: LiveTable, samples: int = 100) -> None:
 
 def test_live_without_a_terminal_prints_changes_only(platoon: Design) -> None:
     out = io.StringIO()
-    with LiveTable(
-        platoon, 100, Console(file=out, force_terminal=False, width=120)
-    ) as table:
+    with LiveTable(platoon, 100, Console(file=out, force_terminal=False, width=120)) as table:
         run_live(table)
     lines = out.getvalue().splitlines()
     assert len(lines) == 3
@@ -632,9 +570,7 @@ def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state(
     with LiveTable(
         platoon,
         2000,
-        Console(
-            file=out, force_terminal=True, width=100, height=40, color_system="standard"
-        ),
+        Console(file=out, force_terminal=True, width=100, height=40, color_system="standard"),
     ) as table:
         run_live(table, 2000)
         drawn = table.drawn
@@ -648,18 +584,14 @@ def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state(
         "2000 of 2000 samples",
     ):
         assert expected in text
-    assert (
-        out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0
-    )  # the cursor is back
+    assert out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0  # the cursor is back
 
 
 def test_live_ends_cleanly_when_interrupted(platoon: Design) -> None:
     out = io.StringIO()
     with (
         pytest.raises(KeyboardInterrupt),
-        LiveTable(
-            platoon, 10, Console(file=out, force_terminal=True, width=100, height=40)
-        ) as table,
+        LiveTable(platoon, 10, Console(file=out, force_terminal=True, width=100, height=40)) as table,
     ):
         run_live(table, 10)
         raise KeyboardInterrupt

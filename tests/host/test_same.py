@@ -33,9 +33,7 @@ FAULTS = (
 )
 
 
-def sample_by_sample(
-    ready: Ready, samples: int, faults: tuple[str, ...], seed: int, pace: Pace
-) -> Trace:
+def sample_by_sample(ready: Ready, samples: int, faults: tuple[str, ...], seed: int, pace: Pace) -> Trace:
     source = Plant(
         ready.native,
         ready.design,
@@ -49,9 +47,7 @@ def sample_by_sample(
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("scenario", ["rest", "manoeuvres", "adaptive", "default"])
 @pytest.mark.parametrize("faults", [(), FAULTS], ids=["healthy", "faulty"])
-def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(
-    models: Models, real: str, scenario: str, faults: tuple[str, ...]
-) -> None:
+def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(models: Models, real: str, scenario: str, faults: tuple[str, ...]) -> None:
     ready = models.platoon(scenario, None, real)
     for seed, lockstep in ((SEED, False), (SEED + 1, True)):
         slow, fast = (
@@ -60,9 +56,7 @@ def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(
         )
         for name in ("reading", "value", "radius", "r", "J"):
             assert np.array_equal(np.array(getattr(slow, name)), fast[name]), name
-        assert [PLANT_STATES.index(v.plant) for v in slow.verdict] == fast[
-            "plant"
-        ].tolist()
+        assert [PLANT_STATES.index(v.plant) for v in slow.verdict] == fast["plant"].tolist()
         assert [v.bus for v in slow.verdict] == [bus_of(int(b), 2) for b in fast["bus"]]
         assert [sum(1 << g for g in e) for e in slow.events] == fast["events"].tolist()
         if not lockstep:  # replies move the counter of the verdict frames, and with it their stuff bits
@@ -83,15 +77,10 @@ def test_batches_and_traces_of_one_run_agree(models: Models, real: str) -> None:
     batch = ready.batch(150, ("controller2:bias:1.5@60",))
     for run, row in enumerate(batch.runs(0, 5)):
         trace = batch.trace(run)
-        alarm = (
-            np.flatnonzero(trace["plant"][60:] >= PLANT_STATES.index("provisional"))
-            + 60
-        )
+        alarm = np.flatnonzero(trace["plant"][60:] >= PLANT_STATES.index("provisional")) + 60
         assert row["provisional_at"] == (alarm[0] if len(alarm) else -1)
         assert row["measurement"] == int((trace["events"] & 1).sum())
-        assert row["margin"] == pytest.approx(
-            float((np.abs(trace["r"]) / trace["J"])[:60].max()), rel=1e-12
-        )
+        assert row["margin"] == pytest.approx(float((np.abs(trace["r"]) / trace["J"])[:60].max()), rel=1e-12)
         assert row["bits"] == trace["bits"].sum()
 
 
@@ -124,31 +113,23 @@ def generated(
         extra=source + ACCESS,
         includes=("-I", str(folder / "include")),
     )
-    lib.ffi.cdef(
-        "const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);"
-    )
+    lib.ffi.cdef("const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);")
     return ready, lib
 
 
 def generated_node(ready: Ready, lib: Library, start: int) -> Node:
-    native: Any = SimpleNamespace(
-        library=lib, node=lib.lib.test_config(), tables=ready.native.tables
-    )
+    native: Any = SimpleNamespace(library=lib, node=lib.lib.test_config(), tables=ready.native.tables)
     return Node(native, start)
 
 
 def generated_senders(ready: Ready, lib: Library) -> Sender:
-    native: Any = SimpleNamespace(
-        library=lib, senders=lib.lib.test_senders(), tables=ready.native.tables
-    )
+    native: Any = SimpleNamespace(library=lib, senders=lib.lib.test_senders(), tables=ready.native.tables)
     return Sender(native)
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(
-    generated: tuple[Ready, Library], lockstep: bool, loss: float
-) -> None:
+def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(generated: tuple[Ready, Library], lockstep: bool, loss: float) -> None:
     ready, lib = generated
     rng = np.random.default_rng(SEED)
     for start in (REST, 0):
@@ -191,12 +172,8 @@ def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(
 def test_the_committed_tables_are_those_of_the_design(models: Models) -> None:
     header, source = emit_c(models.design())
     folder = Path(__file__).resolve().parents[2] / "firmware" / "models"
-    assert (folder / "platoon.h").read_text(encoding="ascii") == header, (
-        "run: make models"
-    )
-    assert (folder / "platoon.c").read_text(encoding="ascii") == source, (
-        "run: make models"
-    )
+    assert (folder / "platoon.h").read_text(encoding="ascii") == header, "run: make models"
+    assert (folder / "platoon.c").read_text(encoding="ascii") == source, "run: make models"
 
 
 # ---- campaigns ----
@@ -219,10 +196,7 @@ def test_a_campaign_is_the_batch_it_says_it_is(models: Models, cli: Cli) -> None
         "--json",
         "-q",
     ).json["rows"]
-    assert rows == [
-        r | {"attacked": 0}
-        for r in models.platoon("manoeuvres").batch(90, seed=5).runs(0, 7)
-    ]
+    assert rows == [r | {"attacked": 0} for r in models.platoon("manoeuvres").batch(90, seed=5).runs(0, 7)]
 
 
 def test_native_structures_do_not_change_while_runs_use_them(models: Models) -> None:

@@ -139,11 +139,7 @@ def random_source(rng: np.random.Generator) -> dict[str, Any]:
     if way == "tick":
         closing |= {"signals": inputs, "applied_as_sent": bool(rng.random() < 0.7)}
     groups.append(closing)
-    faults = [
-        {"name": f"{s}_fault", "signal": s, "type": t}
-        for s, t in [(y, "sensor") for y in outputs] + [(u, "actuator") for u in inputs]
-        if rng.random() < 0.6
-    ]
+    faults = [{"name": f"{s}_fault", "signal": s, "type": t} for s, t in [(y, "sensor") for y in outputs] + [(u, "actuator") for u in inputs] if rng.random() < 0.6]
     return {
         "schema": 1,
         "name": "random",
@@ -185,9 +181,7 @@ def random_designs() -> tuple[list[tuple[int, Design]], list[str]]:
         number += 1
         assert number < 10 * PLANTS, f"nearly everything is refused: {refused[-5:]}"
         try:
-            made.append(
-                (number, made_of(random_source(np.random.default_rng([SEED, number]))))
-            )
+            made.append((number, made_of(random_source(np.random.default_rng([SEED, number])))))
         except InputError as error:
             refused.append(str(error))
     return made, refused
@@ -211,10 +205,7 @@ def test_random_models_cover_what_they_are_meant_to_cover(
     assert {p.p for p in plants} == {0, 1, 2}
     assert any(np.array_equal(p.C, np.eye(p.n)) for p in plants)
     assert any(p.D.any() for p in plants)
-    orders = {
-        np.sign(d.generators[0].spec.order - d.model.plant.n)
-        for _, d in random_designs[0]
-    }
+    orders = {np.sign(d.generators[0].spec.order - d.model.plant.n) for _, d in random_designs[0]}
     assert orders == {-1, 0, 1}
 
 
@@ -225,9 +216,7 @@ def test_no_random_observer_breaks_the_luenberger_equations(
         for g in made.generators:
             o, p = g.observer, g.plant
             scale = max(1.0, np.abs(o.T).max(), np.abs(o.L).max())
-            assert np.abs(o.T @ p.A - o.G @ o.T - o.L @ p.C).max() <= 1e-9 * scale, (
-                number
-            )
+            assert np.abs(o.T @ p.A - o.G @ o.T - o.L @ p.C).max() <= 1e-9 * scale, number
             assert np.abs(o.V @ p.C - o.W @ o.T).max() <= 1e-9 * scale, number
             if p.B.shape[1]:
                 assert np.abs(o.T @ p.B - o.L @ p.D - o.H).max() <= 1e-9 * scale, number
@@ -255,24 +244,15 @@ def test_no_random_post_filter_is_less_than_all_pass(
                 )
             limit = 1e-9 if np.linalg.cond(f.S) <= 1e3 else 1e-7
             eye = np.eye(o.G.shape[0])
-            for z in np.exp(
-                1j * np.random.default_rng([SEED, number]).uniform(0.0, np.pi, 50)
-            ):
+            for z in np.exp(1j * np.random.default_rng([SEED, number]).uniform(0.0, np.pi, 50)):
                 from_d = Fb + o.W @ np.linalg.solve(z * eye - o.G, Eb)
-                R = f.Mo - f.Mo @ o.W @ np.linalg.solve(
-                    z * eye - o.G + f.Lo @ o.W, f.Lo
-                )
-                assert (
-                    np.abs(np.linalg.svd(R @ from_d, compute_uv=False) - 1.0).max()
-                    <= limit
-                ), number
+                R = f.Mo - f.Mo @ o.W @ np.linalg.solve(z * eye - o.G + f.Lo @ o.W, f.Lo)
+                assert np.abs(np.linalg.svd(R @ from_d, compute_uv=False) - 1.0).max() <= limit, number
 
 
 @pytest.mark.parametrize("real", ["f32", "f64"])
 @pytest.mark.parametrize("how", ["random", "corners"])
-def test_no_healthy_random_plant_raises_an_alarm(
-    random_designs: tuple[list[tuple[int, Design]], list[str]], real: str, how: str
-) -> None:
+def test_no_healthy_random_plant_raises_an_alarm(random_designs: tuple[list[tuple[int, Design]], list[str]], real: str, how: str) -> None:
     for number, made in random_designs[0]:
         rng = np.random.default_rng([SEED, number, 1])
         native = Native(library(real), made.tables)
@@ -280,9 +260,7 @@ def test_no_healthy_random_plant_raises_an_alarm(
         for kind in ("rest", "mixed"):
             reference = Reference(kind, 1.0, int(rng.integers(5, 60)))
             if how == "random":
-                rows = Batch(native, made, SAMPLES, reference, (), SEED + number).runs(
-                    0, 60
-                )
+                rows = Batch(native, made, SAMPLES, reference, (), SEED + number).runs(0, 60)
             else:
                 d = rng.choice([-1.0, 1.0], (SAMPLES, plant.Ed.shape[1]))
                 rows = Batch(
@@ -295,16 +273,12 @@ def test_no_healthy_random_plant_raises_an_alarm(
                     disturbance=d,
                     initial=plant.initial_range * rng.choice([-1.0, 1.0], plant.n),
                 ).runs(0, 10)
-            assert alarms(rows) == Alarms(0, 0), (
-                f"plant {number}: |r|/J up to {max(r['margin'] for r in rows)}"
-            )
+            assert alarms(rows) == Alarms(0, 0), f"plant {number}: |r|/J up to {max(r['margin'] for r in rows)}"
 
 
 @pytest.mark.parametrize("start", [REST, MOVING], ids=["rest", "moving"])
 @pytest.mark.parametrize("loss", [0.1, 0.5])
-def test_no_alarm_of_a_healthy_random_plant_is_confirmed_whatever_is_lost(
-    random_designs: tuple[list[tuple[int, Design]], list[str]], start: int, loss: float
-) -> None:
+def test_no_alarm_of_a_healthy_random_plant_is_confirmed_whatever_is_lost(random_designs: tuple[list[tuple[int, Design]], list[str]], start: int, loss: float) -> None:
     lost = 0
     for number, made in random_designs[0]:
         native = Native(library("f32"), made.tables)
@@ -329,11 +303,7 @@ def test_no_damaged_random_model_does_anything_but_design_or_refuse(
     data: st.DataObject,
 ) -> None:
     """Any one number of the plant, or any one key, replaced by something else: InputError or a design, never another exception."""
-    source = copy.deepcopy(
-        random_source(
-            np.random.default_rng([SEED, data.draw(st.integers(0, 50), "model")])
-        )
-    )
+    source = copy.deepcopy(random_source(np.random.default_rng([SEED, data.draw(st.integers(0, 50), "model")])))
     nasty = st.sampled_from(
         [
             0.0,
@@ -358,15 +328,9 @@ def test_no_damaged_random_model_does_anything_but_design_or_refuse(
     )
     place: Any = source
     for _ in range(8):
-        keys = (
-            list(place.keys()) if isinstance(place, dict) else list(range(len(place)))
-        )
+        keys = list(place.keys()) if isinstance(place, dict) else list(range(len(place)))
         key = data.draw(st.sampled_from(keys), "key")
-        if (
-            isinstance(place[key], (dict, list))
-            and place[key]
-            and data.draw(st.integers(0, 5), "deeper")
-        ):
+        if isinstance(place[key], (dict, list)) and place[key] and data.draw(st.integers(0, 5), "deeper"):
             place = place[key]
             continue
         if data.draw(st.booleans(), "remove"):

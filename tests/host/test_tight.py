@@ -27,9 +27,7 @@ from scipy.optimize import linprog
 
 OUTPUTS, INPUTS = 3, 3
 # Quantisation is no disturbance that a test can choose; ten times finer codes make it small.
-FINE: dict[str, Any] = {f"signals.{i}.resolution": 1e-4 for i in range(OUTPUTS)} | {
-    f"signals.{i}.range": [-2.0, 2.0] for i in range(OUTPUTS)
-}
+FINE: dict[str, Any] = {f"signals.{i}.resolution": 1e-4 for i in range(OUTPUTS)} | {f"signals.{i}.range": [-2.0, 2.0] for i in range(OUTPUTS)}
 LENGTH = 160
 
 
@@ -39,9 +37,7 @@ def exact() -> Iterator[Models]:
     yield Models()
 
 
-def worst_case(
-    ready: Ready, residual: int, k: int
-) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+def worst_case(ready: Ready, residual: int, k: int) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     """Disturbances and the signs of the initial state that make a residual largest at sample k, from the response of plant and fused observer together."""
     generator = ready.design.generators[0]
     plant, fused = generator.plant, generator.linear
@@ -49,9 +45,7 @@ def worst_case(
     into = fused.input[:, :OUTPUTS]
     both = np.block([[plant.A, np.zeros((n, order))], [into @ plant.C, fused.state]])
     enters = np.vstack([plant.Ed, into @ plant.Fd])
-    row = np.hstack(
-        [fused.direct[residual, :OUTPUTS] @ plant.C, fused.output[residual]]
-    )
+    row = np.hstack([fused.direct[residual, :OUTPUTS] @ plant.C, fused.output[residual]])
     d = np.zeros((LENGTH, plant.Ed.shape[1]))
     d[k] = np.sign(fused.direct[residual, :OUTPUTS] @ plant.Fd)
     for j in range(k - 1, -1, -1):
@@ -60,9 +54,7 @@ def worst_case(
     return d, np.sign(row[:n])
 
 
-def ratio_at(
-    ready: Ready, residual: int, k: int, sign: float = 1.0, runs: int = 8
-) -> float:
+def ratio_at(ready: Ready, residual: int, k: int, sign: float = 1.0, runs: int = 8) -> float:
     """Largest |r|/J at sample k over runs that differ in their inputs only."""
     d, x0 = worst_case(ready, residual, k)
     batch = ready.batch(
@@ -87,22 +79,16 @@ def residuals(ready: Ready) -> range:
 
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("k", [0, 3, 20, 60, 150])
-def test_no_periodic_residual_stays_below_its_threshold_by_more_than_2_percent_or_exceeds_it(
-    exact: Models, real: str, k: int
-) -> None:
+def test_no_periodic_residual_stays_below_its_threshold_by_more_than_2_percent_or_exceeds_it(exact: Models, real: str, k: int) -> None:
     ready = exact.platoon("manoeuvres", PERIODIC | FINE, real)
     for i in residuals(ready):
         for sign in (1.0, -1.0):
-            assert 0.98 <= ratio_at(ready, i, k, sign) <= 1.0, (
-                f"residual {i + 1} at sample {k}, sign {sign:g}"
-            )
+            assert 0.98 <= ratio_at(ready, i, k, sign) <= 1.0, f"residual {i + 1} at sample {k}, sign {sign:g}"
 
 
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("k", [20, 60, 150])
-def test_no_periodic_residual_as_designed_exceeds_its_threshold(
-    models: Models, real: str, k: int
-) -> None:
+def test_no_periodic_residual_as_designed_exceeds_its_threshold(models: Models, real: str, k: int) -> None:
     """Codes of 1 mm, whose rounding is 2 to 3 % of the threshold and falls as it may, and few taps: near the threshold, never above it."""
     ready = models.platoon("manoeuvres", PERIODIC, real)
     for i in residuals(ready):
@@ -114,20 +100,14 @@ def test_the_bound_on_what_lies_behind_the_taps_does_not_cost_2_percent_of_a_thr
 ) -> None:
     for generator in models.design().generators:
         tables = generator.tables
-        behind = (
-            tables.tail_output
-            * (tables.tail_input * generator.radius).sum()
-            / (1 - tables.decay)
-        )
+        behind = tables.tail_output * (tables.tail_input * generator.radius).sum() / (1 - tables.decay)
         assert np.all(behind <= 0.02 * tables.steady)
 
 
 # ---- events: held values, true outputs, disturbances and initial state by linear programme ----
 
 
-def pattern(
-    ready: Ready, loss: float, run: int, samples: int
-) -> tuple[dict[str, Any], np.ndarray[Any, Any], np.ndarray[Any, Any], list[int]]:
+def pattern(ready: Ready, loss: float, run: int, samples: int) -> tuple[dict[str, Any], np.ndarray[Any, Any], np.ndarray[Any, Any], list[int]]:
     """A recorded run: its trace, which held value each sample has, radii as they are known at the end, samples at which a gap showed."""
     trace = ready.batch(samples, loss=loss).trace(run)
     table = ready.native.tables.groups[0]
@@ -207,20 +187,13 @@ def largest_residual(
 
 @pytest.mark.parametrize("silence", [0, 1, 2])
 @pytest.mark.parametrize("run", [SEED % 1000, SEED % 1000 + 1])
-def test_no_held_value_within_its_radius_brings_a_residual_over_its_threshold(
-    models: Models, silence: int, run: int
-) -> None:
+def test_no_held_value_within_its_radius_brings_a_residual_over_its_threshold(models: Models, silence: int, run: int) -> None:
     ready = models.platoon("manoeuvres", (None, SILENT_1, SILENT_2)[silence])
     trace, segment, radius, _ = pattern(ready, 0.0, run, 81)
     for i in residuals(ready):
-        ratios = [
-            largest_residual(ready, i, k, segment, radius) / trace["J"][k, i]
-            for k in (12, 40, 60, 80)
-        ]
+        ratios = [largest_residual(ready, i, k, segment, radius) / trace["J"][k, i] for k in (12, 40, 60, 80)]
         assert max(ratios) <= 1.0
-        assert max(ratios) > 0.9, (
-            "the programme does not come near the threshold: it could not show one that is too small"
-        )
+        assert max(ratios) > 0.9, "the programme does not come near the threshold: it could not show one that is too small"
 
 
 def after_gaps(models: Models, lib: Library) -> list[float]:
@@ -230,10 +203,7 @@ def after_gaps(models: Models, lib: Library) -> list[float]:
     for run in range(10):
         trace, segment, radius, gaps = pattern(ready, 0.1, run, 61)
         for k in [g for g in gaps if g > 10][:2]:
-            ratios += [
-                largest_residual(ready, i, k, segment, radius) / trace["J"][k, i]
-                for i in residuals(ready)
-            ]
+            ratios += [largest_residual(ready, i, k, segment, radius) / trace["J"][k, i] for i in residuals(ready)]
     return ratios
 
 
@@ -284,15 +254,11 @@ SMALL_J = {
 
 
 def silent_alarms(models: Models, lib: Library) -> Alarms:
-    return alarms(
-        models.platoon("manoeuvres", SILENT_2, lib=lib).batch(200).runs(0, 200)
-    )
+    return alarms(models.platoon("manoeuvres", SILENT_2, lib=lib).batch(200).runs(0, 200))
 
 
 def lossy_alarms(models: Models, lib: Library) -> Alarms:
-    return alarms(
-        models.platoon("manoeuvres", lib=lib).batch(200, loss=0.1).runs(0, 1000)
-    )
+    return alarms(models.platoon("manoeuvres", lib=lib).batch(200, loss=0.1).runs(0, 1000))
 
 
 def tightest(exact: Models, lib: Library) -> float:
@@ -307,44 +273,30 @@ def worst_held(models: Models, lib: Library) -> float:
         trace, segment, radius, _ = pattern(ready, 0.0, run, 81)
         largest = max(
             largest,
-            *(
-                largest_residual(ready, i, k, segment, radius) / trace["J"][k, i]
-                for i in residuals(ready)
-                for k in (12, 40, 60, 80)
-            ),
+            *(largest_residual(ready, i, k, segment, radius) / trace["J"][k, i] for i in residuals(ready) for k in (12, 40, 60, 80)),
         )
     return largest
 
 
-def test_a_hold_that_ignores_the_silent_phase_is_caught(
-    models: Models, tmp_path: Path
-) -> None:
+def test_a_hold_that_ignores_the_silent_phase_is_caught(models: Models, tmp_path: Path) -> None:
     assert silent_alarms(models, library("f32")) == Alarms(0, 0)
     wrong = silent_alarms(models, build_library(tmp_path, "f32", NO_SILENCE))
     assert wrong.confirmed > 0
     assert wrong.provisional > 0
 
 
-@pytest.mark.parametrize(
-    "mutation", [NO_REWIND, NO_CANCEL], ids=["no rewriting", "no withdrawal"]
-)
-def test_a_library_that_takes_nothing_back_after_a_gap_is_caught(
-    models: Models, tmp_path: Path, mutation: dict[str, list[tuple[str, str]]]
-) -> None:
+@pytest.mark.parametrize("mutation", [NO_REWIND, NO_CANCEL], ids=["no rewriting", "no withdrawal"])
+def test_a_library_that_takes_nothing_back_after_a_gap_is_caught(models: Models, tmp_path: Path, mutation: dict[str, list[tuple[str, str]]]) -> None:
     assert lossy_alarms(models, library("f32")).confirmed == 0
     assert lossy_alarms(models, build_library(tmp_path, "f32", mutation)).confirmed > 0
 
 
-def test_a_detector_that_withdraws_alarms_but_keeps_the_small_radii_of_a_gap_is_caught(
-    models: Models, tmp_path: Path
-) -> None:
+def test_a_detector_that_withdraws_alarms_but_keeps_the_small_radii_of_a_gap_is_caught(models: Models, tmp_path: Path) -> None:
     assert max(after_gaps(models, library("f32"))) <= 1.0
     assert max(after_gaps(models, build_library(tmp_path, "f32", NO_REWRITING))) > 1.0
 
 
-def test_thresholds_that_are_7_percent_too_small_are_caught(
-    models: Models, exact: Models, tmp_path: Path
-) -> None:
+def test_thresholds_that_are_7_percent_too_small_are_caught(models: Models, exact: Models, tmp_path: Path) -> None:
     assert tightest(exact, library("f32")) <= 1.0
     assert worst_held(models, library("f32")) <= 1.0
     mutant = build_library(tmp_path, "f32", SMALL_J)
@@ -352,9 +304,7 @@ def test_thresholds_that_are_7_percent_too_small_are_caught(
     assert worst_held(models, mutant) > 1.0
 
 
-def test_a_rebuilt_library_without_a_mutation_passes_the_same_checks(
-    models: Models, exact: Models, tmp_path: Path
-) -> None:
+def test_a_rebuilt_library_without_a_mutation_passes_the_same_checks(models: Models, exact: Models, tmp_path: Path) -> None:
     """So that it is the mutation, not the rebuilding, that the three tests above see."""
     same = build_library(tmp_path, "f32")
     assert silent_alarms(models, same) == silent_alarms(models, library("f32"))

@@ -42,9 +42,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for model in ("platoon", "openacc"):
         folder = tmp_path_factory.mktemp(model)
         with (folder / "candump.log").open("w") as file:
-            dump = subprocess.Popen(
-                ["candump", "-L", "-r", "4000000", "vcan0"], stdout=file
-            )
+            dump = subprocess.Popen(["candump", "-L", "-r", "4000000", "vcan0"], stdout=file)
             time.sleep(0.3)
             status, said = run(
                 [
@@ -68,25 +66,16 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize("model", ["platoon", "openacc"])
-def test_candump_records_what_run_log_says(
-    model: str, recorded: dict[str, Path]
-) -> None:
+def test_candump_records_what_run_log_says(model: str, recorded: dict[str, Path]) -> None:
     own, seen = bare(recorded[model] / "run.log"), bare(recorded[model] / "candump.log")
     assert len(own) > 600 and own == seen
 
 
 @pytest.mark.parametrize("model", ["platoon", "openacc"])
-def test_canplayer_into_detect(
-    model: str, recorded: dict[str, Path], tmp_path: Path
-) -> None:
+def test_canplayer_into_detect(model: str, recorded: dict[str, Path], tmp_path: Path) -> None:
     """The log played onto the bus, twenty times as fast as it was: the same verdict changes as in the run."""
     fast = tmp_path / "fast.log"
-    fast.write_text(
-        "".join(
-            candump.line(e.time_s / 20, e.channel, e.frame) + "\n"
-            for e in candump.read(recorded[model] / "run.log")
-        )
-    )
+    fast.write_text("".join(candump.line(e.time_s / 20, e.channel, e.frame) + "\n" for e in candump.read(recorded[model] / "run.log")))
     result = json.loads((recorded[model] / "run.json").read_text())
     options = (
         "-i",
@@ -106,15 +95,11 @@ def test_canplayer_into_detect(
         n.wait(30)
     assert n.status == 0, n.err
     told = json.loads(n.lines[-1])
-    assert (
-        told["verdicts"] == result["verdicts"] and told["samples"] == result["samples"]
-    )
+    assert told["verdicts"] == result["verdicts"] and told["samples"] == result["samples"]
     assert any(v["plant"] == "confirmed" for v in told["verdicts"])
 
 
-def test_canplayer_keeps_the_runs_pace(
-    recorded: dict[str, Path], tmp_path: Path
-) -> None:
+def test_canplayer_keeps_the_runs_pace(recorded: dict[str, Path], tmp_path: Path) -> None:
     """The stamps of run.log are a clock that canplayer can follow: 20 samples take two seconds."""
     first = [
         line
@@ -127,20 +112,14 @@ def test_canplayer_keeps_the_runs_pace(
     ]
     (tmp_path / "short.log").write_text("\n".join(first) + "\n")
     began = time.monotonic()
-    subprocess.run(
-        ["canplayer", "-I", str(tmp_path / "short.log")], check=True, timeout=30
-    )
+    subprocess.run(["canplayer", "-I", str(tmp_path / "short.log")], check=True, timeout=30)
     assert 1.5 < time.monotonic() - began < 10
 
 
 @pytest.mark.parametrize("log", ["run.log", "candump.log"])
 @pytest.mark.parametrize("model", ["platoon", "openacc"])
-def test_detect_reads_both_logs(
-    model: str, log: str, recorded: dict[str, Path]
-) -> None:
-    status, said = run(
-        ["detect", model, "--rest", "--log", recorded[model] / log, "--json"]
-    )
+def test_detect_reads_both_logs(model: str, log: str, recorded: dict[str, Path]) -> None:
+    status, said = run(["detect", model, "--rest", "--log", recorded[model] / log, "--json"])
     told, result = (
         json.loads(said),
         json.loads((recorded[model] / "run.json").read_text()),

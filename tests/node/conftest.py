@@ -20,14 +20,10 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    if not session.config.option.collectonly and any(
-        "timing_files" in getattr(item, "fixturenames", ()) for item in session.items
-    ):
+    if not session.config.option.collectonly and any("timing_files" in getattr(item, "fixturenames", ()) for item in session.items):
         out = Path(tempfile.mkdtemp(prefix="hullguard-timing-"))
         runs = [f"{name}:{ticks}:{drop}" for name, (ticks, drop) in TICKS.items()]
-        command = in_guest(
-            "sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=150
-        )
+        command = in_guest("sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=150)
         _started.append(
             (
                 subprocess.Popen(

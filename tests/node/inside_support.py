@@ -73,9 +73,7 @@ def process(*command: object) -> Iterator[Process]:
         first = popen.stdout.readline()
         if first != "ready\n":
             made.wait()
-            raise AssertionError(
-                f"{command}: said {first!r}, status {made.status}: {made.err}"
-            )
+            raise AssertionError(f"{command}: said {first!r}, status {made.status}: {made.err}")
         yield made
     finally:
         made.stop()
@@ -95,10 +93,7 @@ def link(channel: str = "vcan0") -> contextlib.AbstractContextManager[CanLink]:
 
 def reachable(native: Native, frame: Frame) -> bool:
     """Does the node's acceptance filter let a frame pass? Identifier, identifier type and kind count."""
-    return any(
-        (frame.id, frame.flags & 3) == (g.message.id, g.message.flags & 3)
-        for g in native.tables.groups
-    )
+    return any((frame.id, frame.flags & 3) == (g.message.id, g.message.flags & 3) for g in native.tables.groups)
 
 
 class Drive:
@@ -125,25 +120,17 @@ class Drive:
             0,
         )
         closing = self.native.tables.closing
-        self.order = [
-            g for g in range(len(self.native.tables.groups)) if g != closing
-        ] + [closing]
+        self.order = [g for g in range(len(self.native.tables.groups)) if g != closing] + [closing]
 
     def sample(self) -> tuple[list[Frame], Frame]:
         """Measurement frames and the closing frame of the next sample."""
         reading = self.source.read()
         self.source.move()
-        frames = [
-            f
-            for g in self.order
-            if (f := self.sender.step(g, self.k, reading)) is not None
-        ]
+        frames = [f for g in self.order if (f := self.sender.step(g, self.k, reading)) is not None]
         self.k += 1
         return frames[:-1], frames[-1]
 
-    def take(
-        self, frames: list[Frame], lockstep: bool = True
-    ) -> tuple[list[Verdict], list[Frame]]:
+    def take(self, frames: list[Frame], lockstep: bool = True) -> tuple[list[Verdict], list[Frame]]:
         """What the node makes of frames: the verdict of each step, and what it sends."""
         verdicts, sent = [], []
         for frame in frames:
@@ -169,17 +156,13 @@ class Drive:
         return int(self.native.tables.status.id)
 
 
-def collect(
-    bus: CanLink, ids: set[int], count: int, timeout_s: float = WAIT_S
-) -> list[Frame]:
+def collect(bus: CanLink, ids: set[int], count: int, timeout_s: float = WAIT_S) -> list[Frame]:
     """The next `count` frames with these identifiers."""
     found: list[Frame] = []
     end = time.monotonic() + timeout_s
     while len(found) < count:
         got = bus.receive(max(0.0, end - time.monotonic()))
-        assert got is not None, (
-            f"{len(found)} of {count} frames with {[hex(i) for i in sorted(ids)]} came"
-        )
+        assert got is not None, f"{len(found)} of {count} frames with {[hex(i) for i in sorted(ids)]} came"
         if got[0].id in ids:
             found.append(got[0])
     return found
@@ -200,9 +183,7 @@ def exchange(bus: CanLink, drive: Drive, frames: list[Frame]) -> list[Verdict]:
     for frame in frames:
         bus.send(frame)
     got = collect(bus, {drive.verdict_id, drive.status_id}, len(expected))
-    assert got == expected, (
-        f"sample {drive.k - 1}: {[drive.told(f) for f in got if f.id == drive.verdict_id]}, expected {verdicts}"
-    )
+    assert got == expected, f"sample {drive.k - 1}: {[drive.told(f) for f in got if f.id == drive.verdict_id]}, expected {verdicts}"
     return verdicts
 
 
@@ -213,9 +194,7 @@ def health(process_: Process) -> dict[str, dict[str, Any]]:
         name, _, rest = word.partition("=")
         if "/good:" in rest:
             bus, *counts = rest.split("/")
-            rows[name] = {"bus": bus} | {
-                c.split(":")[0]: int(c.split(":")[1]) for c in counts
-            }
+            rows[name] = {"bus": bus} | {c.split(":")[0]: int(c.split(":")[1]) for c in counts}
     return rows
 
 

@@ -18,18 +18,14 @@ BUS_TIMER = BUILD / "node" / "bus_timer"
 ORACLE_RUN = BUILD / "oracle" / "oracle_run"
 WITH_VCAN = BUILD / "with-vcan" / "with-vcan"
 # The seed of tests/host when both run in one session.
-SEED = getattr(sys.modules.get("host_support"), "SEED", None) or int(
-    os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little")
-)
+SEED = getattr(sys.modules.get("host_support"), "SEED", None) or int(os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little"))
 
 Result = subprocess.CompletedProcess[str]
 
 
 def environment(**more: str) -> dict[str, str]:
     """What commands find the package and the seed by."""
-    path = os.pathsep.join(
-        [str(ROOT / "host_tools"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    )
+    path = os.pathsep.join([str(ROOT / "host_tools"), *filter(None, [os.environ.get("PYTHONPATH")])])
     return (
         os.environ
         | {
@@ -59,9 +55,7 @@ def hullguard(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "hullguard", *map(str, arguments)]
 
 
-def in_guest(
-    *arguments: object, interfaces: int = 1, timeout_s: int = 100
-) -> list[str]:
+def in_guest(*arguments: object, interfaces: int = 1, timeout_s: int = 100) -> list[str]:
     """A command line inside with-vcan."""
     return [
         str(WITH_VCAN),
@@ -99,6 +93,4 @@ def run_inside(file: str, out: Path, interfaces: int = 1, timeout_s: int = 100) 
         timeout_s + 30,
     )
     print(done.stdout)
-    assert done.returncode == 0, (
-        f"{file} inside with-vcan: exit status {done.returncode}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"
-    )
+    assert done.returncode == 0, f"{file} inside with-vcan: exit status {done.returncode}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"

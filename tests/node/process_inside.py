@@ -42,16 +42,10 @@ def alarmed(verdicts: list, state: str) -> bool:
 # ---- start and end ----
 
 
-@pytest.mark.parametrize(
-    "number", [signal.SIGTERM, signal.SIGINT], ids=lambda n: n.name
-)
-@pytest.mark.parametrize(
-    "options", [("--lockstep",), ("--rest",), ()], ids=lambda o: "".join(o) or "timed"
-)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda n: n.name)
+@pytest.mark.parametrize("options", [("--lockstep",), ("--rest",), ()], ids=lambda o: "".join(o) or "timed")
 @pytest.mark.parametrize("traffic", [False, True], ids=["silent", "traffic"])
-def test_a_signal_ends_it_cleanly(
-    number: signal.Signals, options: tuple[str, ...], traffic: bool, tmp_path: Path
-) -> None:
+def test_a_signal_ends_it_cleanly(number: signal.Signals, options: tuple[str, ...], traffic: bool, tmp_path: Path) -> None:
     missed = tmp_path / "missed"
     with link() as bus, node("--status", "--timing", missed, *options) as n:
         if traffic:
@@ -94,9 +88,7 @@ def test_an_interface_that_goes_down_and_comes_back() -> None:
                 time.sleep(0.1)
                 subprocess.run(["ip", "link", "set", "vcan1", "up"], check=True)
                 time.sleep(0.1)
-                with contextlib.suppress(
-                    BusError
-                ):  # this end's socket tells once that its interface was down
+                with contextlib.suppress(BusError):  # this end's socket tells once that its interface was down
                     bus.receive(0.0)
             frames, tick = drive.sample()
             exchange(bus, drive, [*frames, tick])
@@ -136,26 +128,17 @@ def test_heartbeat_and_verdict_on_change() -> None:
     records = [(v.plant, v.candidates, v.bus, v.refused) for v in verdicts]
     change = [k for k in range(160) if k == 0 or records[k] != records[k - 1]]
     assert [v.k for v in told] == sorted(set(change) | set(range(0, 160, heartbeat)))
-    assert [(v.plant, v.candidates, v.bus, v.refused) for v in told] == [
-        records[v.k] for v in told
-    ]
-    assert len(set(change) - set(range(0, 160, heartbeat))) >= 2, (
-        "the run changes between heartbeats"
-    )
+    assert [(v.plant, v.candidates, v.bus, v.refused) for v in told] == [records[v.k] for v in told]
+    assert len(set(change) - set(range(0, 160, heartbeat))) >= 2, "the run changes between heartbeats"
     status = [f for f in got if f.id == drive.status_id]
-    assert [f.data[1] >> 4 for f in status] == [
-        k % 16 for k in range(0, 160, heartbeat)
-    ]
+    assert [f.data[1] >> 4 for f in status] == [k % 16 for k in range(0, 160, heartbeat)]
     assert {int.from_bytes(f.data[2:6], "little") for f in status} == {bits}
 
 
 @pytest.mark.parametrize("model", ["platoon", "openacc"])
 def test_the_model_hash_is_the_same_everywhere(model: str) -> None:
     drive = Drive(model, "default")
-    listed = dict(
-        line.split()
-        for line in command([str(NODE["f32"]), "--list"]).stdout.splitlines()
-    )
+    listed = dict(line.split() for line in command([str(NODE["f32"]), "--list"]).stdout.splitlines())
     assert listed[model] == f"{drive.design.tables.hash:08x}"
     with link() as bus, node("--model", model, "--lockstep", "--rest"):
         frames, tick = drive.sample()
@@ -185,9 +168,7 @@ def test_ticks_dropped_in_lockstep(missing: int) -> None:
             told += verdicts
             if k == 30 + missing:
                 assert [v.k for v in verdicts] == list(range(30, 31 + missing))
-                assert all(v.bus[1] != "good" for v in verdicts[:-1]), (
-                    "the samples without a tick say so"
-                )
+                assert all(v.bus[1] != "good" for v in verdicts[:-1]), "the samples without a tick say so"
         n.stop()
     assert [v.k for v in told] == list(range(60))
     assert not alarmed(told, "confirmed")
@@ -197,16 +178,10 @@ def test_ticks_dropped_in_lockstep(missing: int) -> None:
 def spoilt(good: Frame) -> dict[str, Frame]:
     """Everything that a measurement frame can become, and is not."""
     number = int.from_bytes(good.data, "little")
-    out = {
-        f"bit {i}": Frame(good.id, good.flags, (number ^ 1 << i).to_bytes(8, "little"))
-        for i in range(64)
-    }
+    out = {f"bit {i}": Frame(good.id, good.flags, (number ^ 1 << i).to_bytes(8, "little")) for i in range(64)}
     out |= {f"length {n}": Frame(good.id, good.flags, good.data[:n]) for n in range(8)}
     out["again"] = good  # length 8: a duplicate
-    out |= {
-        f"fd {n}": Frame(good.id, good.flags | FD, (good.data * 8)[:n])
-        for n in (8, 12, 64)
-    }
+    out |= {f"fd {n}": Frame(good.id, good.flags | FD, (good.data * 8)[:n]) for n in (8, 12, 64)}
     out["fd brs"] = Frame(good.id, good.flags | FD | BRS, good.data)
     out["remote"] = Frame(good.id, good.flags | REMOTE, b"")
     out["extended"] = Frame(good.id, good.flags | EXTENDED, good.data)
@@ -235,9 +210,7 @@ def test_spoilt_measurements_are_no_plant_fault(place: str) -> None:
             if frames:
                 last, sent = frames[0], sent + 1
             # In every second sample, or in place of every third frame.
-            wanted = (
-                k % 2 == 0 if place == "between" else bool(frames) and sent % 3 == 0
-            )
+            wanted = k % 2 == 0 if place == "between" else bool(frames) and sent % 3 == 0
             if wanted and last is not None and 40 <= k < samples - 140:
                 every = spoilt(last)
                 name = list(every)[len(kinds) % len(every)]
@@ -288,10 +261,7 @@ def test_frames_of_strangers_change_nothing() -> None:
             verdicts, expected = drive.take([*frames, tick])
             for f in [*frames, tick]:
                 bus.send(f)
-            assert (
-                collect(bus, {drive.verdict_id, drive.status_id}, len(expected))
-                == expected
-            )
+            assert collect(bus, {drive.verdict_id, drive.status_id}, len(expected)) == expected
             assert verdicts[-1].bus == ("good", "good")
         n.stop()
     assert all(row["refused"] == row["lost"] == 0 for row in health(n).values())
@@ -317,16 +287,10 @@ def test_a_stopped_node_is_no_plant_fault() -> None:
             while (told := bus.receive(0.001)) is not None:
                 got.append(told[0])
         n.stop()
-    confirmed = [
-        v.k
-        for v in (drive.told(f) for f in got if f.id == drive.verdict_id)
-        if v.plant == "confirmed"
-    ]
+    confirmed = [v.k for v in (drive.told(f) for f in got if f.id == drive.verdict_id) if v.plant == "confirmed"]
     assert n.status == 0 and f" outages={len(at)} " in n.lines[-1]
     # The node's samples lag: what it never heard of, and 16 at a time, it has not counted.
-    assert confirmed and confirmed[0] >= samples - 100 - 16 * len(at), (
-        f"a fault is found, and none before it: {confirmed[:1]}"
-    )
+    assert confirmed and confirmed[0] >= samples - 100 - 16 * len(at), f"a fault is found, and none before it: {confirmed[:1]}"
 
 
 # ---- together ----
@@ -360,16 +324,12 @@ def test_two_nodes_on_one_bus() -> None:
             got = collect(bus, ids, len(expected))
             for drive in (platoon, openacc):
                 own = {drive.verdict_id, drive.status_id}
-                assert [f for f in got if f.id in own] == [
-                    f for f in expected if f.id in own
-                ]
+                assert [f for f in got if f.id in own] == [f for f in expected if f.id in own]
         a.stop()
         b.stop()
     assert (a.status, b.status) == (0, 0)
     for name, start in (("platoon", 60), ("openacc", 90)):
-        assert not alarmed(seen[name][:start], "provisional") and alarmed(
-            seen[name][start:], "confirmed"
-        ), name
+        assert not alarmed(seen[name][:start], "provisional") and alarmed(seen[name][start:], "confirmed"), name
     for n in (a, b):
         assert all(row["refused"] == row["lost"] == 0 for row in health(n).values())
 
@@ -379,31 +339,20 @@ ON_BUS = ("-i", "socketcan", "-c", "vcan0")
 
 @pytest.mark.parametrize("other", ["detect", "detector_node"])
 def test_plant_and_node_by_hand(other: str) -> None:
-    started = (
-        detect("platoon", *ON_BUS, "--lockstep", "--rest", "--ready", "--json")
-        if other == "detect"
-        else node("--lockstep", "--rest")
-    )
+    started = detect("platoon", *ON_BUS, "--lockstep", "--rest", "--ready", "--json") if other == "detect" else node("--lockstep", "--rest")
     with started as n:
         plant = command(
-            hullguard(
-                "plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--json"
-            ),
+            hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--json"),
             timeout_s=30,
         )
         n.stop()
     assert plant.returncode == 0, plant.stderr
     result = json.loads(plant.stdout)
-    assert result["faults"][0]["confirmed_at"] is not None and result[
-        "false_alarms"
-    ] == {"provisional": 0, "confirmed": 0}
+    assert result["faults"][0]["confirmed_at"] is not None and result["false_alarms"] == {"provisional": 0, "confirmed": 0}
     assert n.status == 0
     if other == "detect":
         told = json.loads(n.lines[-1])
-        assert (
-            told["verdicts"] == result["verdicts"]
-            and told["samples"] == result["samples"]
-        )
+        assert told["verdicts"] == result["verdicts"] and told["samples"] == result["samples"]
         assert told["communication"] | {"unknown": 0} == result["communication"]
 
 
@@ -442,9 +391,7 @@ def test_plant_without_a_node_says_so() -> None:
             "max",
         ]
     )
-    assert done.returncode == 3 and re.fullmatch(
-        r"hullguard: [^\n]*did not answer sample 0[^\n]*--lockstep[^\n]*\n", done.stderr
-    )
+    assert done.returncode == 3 and re.fullmatch(r"hullguard: [^\n]*did not answer sample 0[^\n]*--lockstep[^\n]*\n", done.stderr)
 
 
 def test_detect_listens_and_says_nothing_on_the_bus() -> None:
@@ -474,14 +421,8 @@ def test_detect_listens_and_says_nothing_on_the_bus() -> None:
     assert n.status == 0, n.err
     told = json.loads(n.lines[-1])
     assert told["samples"] == 120
-    changes = [
-        v
-        for i, v in enumerate(verdicts)
-        if i == 0 or (v.plant, v.bus) != (verdicts[i - 1].plant, verdicts[i - 1].bus)
-    ]
-    assert [
-        (c["k"], c["plant"], tuple(c["bus"].values())) for c in told["verdicts"]
-    ] == [(v.k, v.plant, v.bus) for v in changes]
+    changes = [v for i, v in enumerate(verdicts) if i == 0 or (v.plant, v.bus) != (verdicts[i - 1].plant, verdicts[i - 1].bus)]
+    assert [(c["k"], c["plant"], tuple(c["bus"].values())) for c in told["verdicts"]] == [(v.k, v.plant, v.bus) for v in changes]
     assert alarmed(changes, "confirmed")
 
 

@@ -59,9 +59,7 @@ def test_no_such_bus_is_status_3_in_one_line() -> None:
         run = command(
             [
                 *guest,
-                *hullguard(
-                    "run", "platoon", "--bus", "vcan9", "--scenario", "rest", "--json"
-                ),
+                *hullguard("run", "platoon", "--bus", "vcan9", "--scenario", "rest", "--json"),
             ]
         )
         assert (run.returncode, run.stdout) == (3, "")
@@ -72,9 +70,7 @@ def test_no_such_bus_is_status_3_in_one_line() -> None:
 def test_bus_auto_finds_a_bus_and_says_which(tmp_path: Path) -> None:
     """Where this machine has no vcan, the command runs itself again inside with-vcan."""
     made_here = choose.existing_vcan()
-    done = command(
-        hullguard("run", "platoon", "--samples", "20", "--no-fault", "--out", tmp_path)
-    )
+    done = command(hullguard("run", "platoon", "--samples", "20", "--no-fault", "--out", tmp_path))
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     how = (
@@ -90,12 +86,8 @@ def test_bus_auto_finds_a_bus_and_says_which(tmp_path: Path) -> None:
     result = json.loads((tmp_path / "run.json").read_text())
     assert f"bus: {result['bus']}" in how and result["samples"] == 20
     assert (tmp_path / "report.html").is_file() and (tmp_path / "run.log").is_file()
-    shown = command(
-        hullguard("run", "platoon", "--samples", "20", "--no-fault", "--json")
-    )
-    assert json.loads(shown.stdout)["bus"] == result["bus"], (
-        "one JSON object through the guest"
-    )
+    shown = command(hullguard("run", "platoon", "--samples", "20", "--no-fault", "--json"))
+    assert json.loads(shown.stdout)["bus"] == result["bus"], "one JSON object through the guest"
 
 
 def test_without_a_launcher_auto_is_in_process_and_says_so(tmp_path: Path) -> None:
@@ -109,11 +101,7 @@ def test_without_a_launcher_auto_is_in_process_and_says_so(tmp_path: Path) -> No
     )
     shutil.copytree(choose.ROOT / "host_tools" / "models", moved / "models")
     shutil.copytree(choose.ROOT / "build" / "lib", tmp_path / "build" / "lib")
-    path = os.pathsep.join(
-        p
-        for p in os.environ["PATH"].split(os.pathsep)
-        if not (Path(p) / "with-vcan").exists()
-    )
+    path = os.pathsep.join(p for p in os.environ["PATH"].split(os.pathsep) if not (Path(p) / "with-vcan").exists())
     done = command(
         hullguard("run", "platoon", "--samples", "20", "--no-fault"),
         PYTHONPATH=str(moved),

@@ -108,13 +108,9 @@ class Ended:
         return dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
 
 
-def made(
-    folder: Path, cases: list[Case], bus: str, launch: list[str]
-) -> dict[Case, Ended]:
+def made(folder: Path, cases: list[Case], bus: str, launch: list[str]) -> dict[Case, Ended]:
     folder.mkdir()
-    (folder / "commands").write_text(
-        json.dumps({c.name: c.arguments(folder, bus) for c in cases})
-    )
+    (folder / "commands").write_text(json.dumps({c.name: c.arguments(folder, bus) for c in cases}))
     done = command(
         [
             *launch,
@@ -124,9 +120,7 @@ def made(
         ],
         HULLGUARD_INSIDE="1",
     )
-    assert done.returncode == 0, (
-        f"{' '.join(launch)}: exit status {done.returncode}: {done.stdout} {done.stderr}"
-    )
+    assert done.returncode == 0, f"{' '.join(launch)}: exit status {done.returncode}: {done.stdout} {done.stderr}"
     found = {}
     for c in cases:
         told = json.loads((folder / f"{c.name}.json").read_text())
@@ -141,9 +135,7 @@ def made(
 
 @pytest.fixture(scope="module")
 def in_process(tmp_path_factory: pytest.TempPathFactory) -> dict[Case, Ended]:
-    return made(
-        tmp_path_factory.mktemp("same") / "process", HERE_AND_NOW, "inprocess", []
-    )
+    return made(tmp_path_factory.mktemp("same") / "process", HERE_AND_NOW, "inprocess", [])
 
 
 @pytest.fixture(scope="module")
@@ -152,39 +144,24 @@ def on_vcan(tmp_path_factory: pytest.TempPathFactory) -> dict[Case, Ended]:
 
 
 @pytest.mark.parametrize("case", ON_VCAN, ids=lambda c: c.name)
-def test_same_seed_same_verdicts(
-    case: Case, in_process: dict[Case, Ended], on_vcan: dict[Case, Ended]
-) -> None:
+def test_same_seed_same_verdicts(case: Case, in_process: dict[Case, Ended], on_vcan: dict[Case, Ended]) -> None:
     inside, outside = on_vcan[case], in_process[case]
     assert (inside.status, outside.status) == (0, 0), f"{inside.err}\n{outside.err}"
-    node = (
-        ("detector_node" if case.real == "f32" else "detector_node_f64")
-        if case.compiled_in
-        else "hullguard detect"
-    )
+    node = ("detector_node" if case.real == "f32" else "detector_node_f64") if case.compiled_in else "hullguard detect"
     assert f"node: {node}, a process of its own" in inside.err.splitlines()
     assert "node:" not in outside.err
-    assert (
-        inside.result["bus"].startswith("vcan0")
-        and outside.result["bus"] == "in process (no CAN bus)"
-    )
+    assert inside.result["bus"].startswith("vcan0") and outside.result["bus"] == "in process (no CAN bus)"
     for key in ("verdicts", "faults", "frames", "communication"):
         assert inside.result[key] == outside.result[key], key
-    assert {k: v for k, v in inside.result.items() if k != "bus"} == {
-        k: v for k, v in outside.result.items() if k != "bus"
-    }
+    assert {k: v for k, v in inside.result.items() if k != "bus"} == {k: v for k, v in outside.result.items() if k != "bus"}
 
 
 @pytest.mark.parametrize("case", ON_VCAN, ids=lambda c: c.name)
-def test_same_seed_same_frames(
-    case: Case, in_process: dict[Case, Ended], on_vcan: dict[Case, Ended]
-) -> None:
+def test_same_seed_same_frames(case: Case, in_process: dict[Case, Ended], on_vcan: dict[Case, Ended]) -> None:
     inside, outside = on_vcan[case], in_process[case]
     assert inside.log() == outside.log()
     for name in ("signals.csv", "labels.csv"):
-        assert (inside.files / name).read_bytes() == (
-            outside.files / name
-        ).read_bytes(), name
+        assert (inside.files / name).read_bytes() == (outside.files / name).read_bytes(), name
     times = [e.time_s for e in candump.read(inside.files / "run.log")]
     assert times == sorted(times), "a log has one clock"
 
@@ -192,11 +169,7 @@ def test_same_seed_same_frames(
 @pytest.mark.parametrize("case", ON_VCAN, ids=lambda c: c.name)
 def test_another_seed_is_another_run(case: Case, in_process: dict[Case, Ended]) -> None:
     """The comparison above can fail: the seed reaches the frames."""
-    other = (
-        Case(case.model, "manoeuvres" if case.scenario == "rest" else "rest", case.real)
-        if case.model == "platoon"
-        else None
-    )
+    other = Case(case.model, "manoeuvres" if case.scenario == "rest" else "rest", case.real) if case.model == "platoon" else None
     if other in in_process:
         assert in_process[case].log() != in_process[other].log()
     log = in_process[case].log()
@@ -233,9 +206,7 @@ def settled(native: Native, reading: list[float]) -> list[float]:
         for i, s in enumerate(group.signals):
             x = out[group.first + i]
             code = lib.hg_code_encode(ffi.addressof(scale, i), x)
-            if s.minimum <= code <= s.maximum and code != round(
-                (x - s.offset) / s.resolution
-            ):
+            if s.minimum <= code <= s.maximum and code != round((x - s.offset) / s.resolution):
                 assert abs(x - (s.offset + code * s.resolution)) < 0.51 * s.resolution
                 out[group.first + i] = s.offset + code * s.resolution
     return out
@@ -255,17 +226,11 @@ def oracle(case: Case, run: Ended, folder: Path) -> Chain:
         for k in range(len(columns["k"])):
             reading = source.read()
             source.move()
-            assert np.allclose(
-                reading, [columns[n][k] for n in names], rtol=1e-8, atol=1e-12
-            ), f"sample {k}: not the readings of the run"
+            assert np.allclose(reading, [columns[n][k] for n in names], rtol=1e-8, atol=1e-12), f"sample {k}: not the readings of the run"
             file.write(",".join(f"{x:.17g}" for x in settled(native, reading)) + "\n")
-    done = command(
-        [str(ORACLE_RUN), str(folder / "model.txt"), str(folder / "signals.csv")]
-    )
+    done = command([str(ORACLE_RUN), str(folder / "model.txt"), str(folder / "signals.csv")])
     assert done.returncode == 0, done.stderr
-    rows = np.array(
-        [[float(x) for x in line.split(",")] for line in done.stdout.splitlines()]
-    )
+    rows = np.array([[float(x) for x in line.split(",")] for line in done.stdout.splitlines()])
     width = ready.tables.residuals
     assert rows.shape == (len(columns["k"]), 3 + 2 * width)
     return Chain(
@@ -279,12 +244,7 @@ def oracle(case: Case, run: Ended, folder: Path) -> Chain:
 
 def bus_bits(run: Ended, groups: list[str]) -> list[int]:
     """Bus health of every sample, as the verdict frame carries it, from the changes in the JSON object."""
-    changes = {
-        v["k"]: sum(
-            BUS_STATES.index(v["bus"][g]) << 2 * i for i, g in enumerate(groups)
-        )
-        for v in run.result["verdicts"]
-    }
+    changes = {v["k"]: sum(BUS_STATES.index(v["bus"][g]) << 2 * i for i, g in enumerate(groups)) for v in run.result["verdicts"]}
     bits, now = [], -1
     for k in range(run.result["samples"]):
         now = changes.get(k, now)
@@ -296,55 +256,39 @@ def residuals(run: Ended) -> tuple[np.ndarray, np.ndarray]:
     """r and J of the library."""
     columns = run.columns()
     labels = [c[1:] for c in columns if c.startswith("r") and f"J{c[1:]}" in columns]
-    return np.column_stack([columns[f"r{name}"] for name in labels]), np.column_stack(
-        [columns[f"J{name}"] for name in labels]
-    )
+    return np.column_stack([columns[f"r{name}"] for name in labels]), np.column_stack([columns[f"J{name}"] for name in labels])
 
 
 @pytest.mark.parametrize("case", DOUBLE, ids=lambda c: c.name)
-def test_float64_against_the_oracle(
-    case: Case, in_process: dict[Case, Ended], tmp_path: Path
-) -> None:
+def test_float64_against_the_oracle(case: Case, in_process: dict[Case, Ended], tmp_path: Path) -> None:
     run = in_process[case]
     exact = oracle(case, run, tmp_path)
     r, J = residuals(run)
     above, ratio = J - exact.J, J / exact.J
     share = np.abs(r - exact.r) / above
-    print(
-        f"|r - oracle| at most {share.max():.3g} of J - oracle; J / oracle {ratio.min():.6f} .. {ratio.max():.6f}, median {np.median(ratio, axis=0).max():.6f}"
-    )
-    assert above.min() > 0.0, (
-        f"a threshold below the exact one, sample {above.min(axis=1).argmin()}"
-    )
+    print(f"|r - oracle| at most {share.max():.3g} of J - oracle; J / oracle {ratio.min():.6f} .. {ratio.max():.6f}, median {np.median(ratio, axis=0).max():.6f}")
+    assert above.min() > 0.0, f"a threshold below the exact one, sample {above.min(axis=1).argmin()}"
     assert share.max() <= R_SHARE, f"sample {share.max(axis=1).argmax()}"
     assert np.median(ratio, axis=0).max() <= J_ABOVE_MEDIAN
     assert ratio.max() <= J_ABOVE, f"sample {ratio.max(axis=1).argmax()}"
     assert exact.bus == bus_bits(run, [g.name for g in exact.design.tables.groups])
     # A residual between the two thresholds is an alarm of the oracle alone: up to there the states are the same, sample by sample.
-    between = np.flatnonzero(
-        ((np.abs(exact.r) > exact.J) & (np.abs(r) <= J)).any(axis=1)
-    )
+    between = np.flatnonzero(((np.abs(exact.r) > exact.J) & (np.abs(r) <= J)).any(axis=1))
     same = int(between[0]) if len(between) else len(exact.plant)
     assert run.columns()["plant"].astype(int).tolist()[:same] == exact.plant[:same]
     if run.result["faults"]:
         assert PLANTS["confirmed"] in exact.plant, "the oracle finds the fault as well"
     else:
-        assert same == len(exact.plant), (
-            "a healthy plant has no residual above the exact threshold"
-        )
+        assert same == len(exact.plant), "a healthy plant has no residual above the exact threshold"
 
 
 @pytest.mark.parametrize("case", SINGLE, ids=lambda c: c.name)
-def test_an_alarm_in_float32_is_the_oracles_too(
-    case: Case, in_process: dict[Case, Ended], tmp_path: Path
-) -> None:
+def test_an_alarm_in_float32_is_the_oracles_too(case: Case, in_process: dict[Case, Ended], tmp_path: Path) -> None:
     """Single precision widens its thresholds by all that it may round."""
     run = in_process[case]
     exact = oracle(case, run, tmp_path)
     r, J = residuals(run)
     assert (J > exact.J * (1.0 - 1e-6)).all()
     alarms, own = (np.abs(exact.r) > exact.J).any(axis=1), (np.abs(r) > J).any(axis=1)
-    assert not (own & ~alarms).any(), (
-        f"sample {np.flatnonzero(own & ~alarms)[:1]}: an alarm that the oracle does not see"
-    )
+    assert not (own & ~alarms).any(), f"sample {np.flatnonzero(own & ~alarms)[:1]}: an alarm that the oracle does not see"
     assert own.any() == bool(run.result["faults"])

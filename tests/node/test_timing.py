@@ -23,15 +23,9 @@ class Span:
     end: int
 
 
-def unexplained(
-    misses: list[Span], gaps: list[Span], period_us: int = PERIOD_US
-) -> list[Span]:
+def unexplained(misses: list[Span], gaps: list[Span], period_us: int = PERIOD_US) -> list[Span]:
     """Missed deadlines (due, noticed) that lie further than one period from every gap."""
-    return [
-        m
-        for m in misses
-        if not any(g.start - period_us <= m.start <= g.end + period_us for g in gaps)
-    ]
+    return [m for m in misses if not any(g.start - period_us <= m.start <= g.end + period_us for g in gaps)]
 
 
 @dataclass(frozen=True)
@@ -49,9 +43,7 @@ class Seen:
 
     def health(self, group: str) -> tuple[int, int, int]:
         """Frames good, lost, refused."""
-        found = re.search(
-            rf" {group}=\w+/good:(\d+)/lost:(\d+)/refused:(\d+)", self.status
-        )
+        found = re.search(rf" {group}=\w+/good:(\d+)/lost:(\d+)/refused:(\d+)", self.status)
         assert found, self.status
         return int(found[1]), int(found[2]), int(found[3])
 
@@ -63,20 +55,12 @@ class Seen:
 
 
 def numbers(text: str) -> dict[str, int]:
-    return {
-        words[0]: int(words[1])
-        for line in text.splitlines()
-        if len(words := line.split()) == 2
-    }
+    return {words[0]: int(words[1]) for line in text.splitlines() if len(words := line.split()) == 2}
 
 
 def read(folder: Path, name: str) -> Seen:
     watch = (folder / f"{name}.watch").read_text()
-    gaps = [
-        Span(int(w[2]), int(w[3]))
-        for line in watch.splitlines()
-        if (w := line.split())[0] == "gap"
-    ]
+    gaps = [Span(int(w[2]), int(w[3])) for line in watch.splitlines() if (w := line.split())[0] == "gap"]
     told = numbers(watch)
     missed = (folder / f"{name}.missed").read_text().splitlines()
     head = re.fullmatch(r"# samples (\d+) missed (\d+) outages (\d+)", missed[0])
@@ -104,9 +88,7 @@ def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(
     timing_files: Path,
 ) -> None:
     seen = read(timing_files, "steady")
-    print(
-        f"{len(seen.misses)} missed, {len(seen.gaps)} gaps; longest {seen.watch['longest_tick_us']} us between ticks, {seen.watch['longest_wake_us']} us between wake-ups"
-    )
+    print(f"{len(seen.misses)} missed, {len(seen.gaps)} gaps; longest {seen.watch['longest_tick_us']} us between ticks, {seen.watch['longest_wake_us']} us between wake-ups")
     assert seen.watch["last_us"] - seen.watch["first_us"] >= 59.9e6
     assert seen.watch["wakes"] > 0.5 * 6000, "the reference's own timer must have run"
     assert not unexplained(seen.misses, seen.gaps)
@@ -114,12 +96,7 @@ def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(
 
 def test_no_frame_is_lost(timing_files: Path) -> None:
     seen = read(timing_files, "steady")
-    assert (
-        seen.send["ticks"]
-        == seen.send["control"]
-        == seen.watch["ticks"]
-        == TICKS["steady"][0]
-    )
+    assert seen.send["ticks"] == seen.send["control"] == seen.watch["ticks"] == TICKS["steady"][0]
     assert (
         seen.counter("dropped"),
         seen.counter("malformed"),
@@ -133,15 +110,9 @@ def test_no_frame_is_lost(timing_files: Path) -> None:
         assert lost == 0, f"{group}: by its sequence counter"
         # After an outage (node.h) a measurement before the next closing frame is refused without being counted.
         untold = seen.send[group] - good - refused
-        assert (
-            0 <= untold <= (0 if group == "control" else int(seen.counter("outages")))
-        ), f"{group}: {good} booked and {refused} late of {seen.send[group]}"
-        assert refused == 0 or seen.misses, (
-            f"{group}: {refused} frames refused though every tick came in time"
-        )
-    assert seen.steps == seen.health("control")[0] + seen.all_misses, (
-        "a step has a closing frame or a missed deadline"
-    )
+        assert 0 <= untold <= (0 if group == "control" else int(seen.counter("outages"))), f"{group}: {good} booked and {refused} late of {seen.send[group]}"
+        assert refused == 0 or seen.misses, f"{group}: {refused} frames refused though every tick came in time"
+    assert seen.steps == seen.health("control")[0] + seen.all_misses, "a step has a closing frame or a missed deadline"
 
 
 def test_a_healthy_plant_stays_healthy(timing_files: Path) -> None:

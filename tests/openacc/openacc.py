@@ -39,12 +39,8 @@ REST = Reference("rest", 0.0, 1)
 
 def generated(made: Design, native: Native, samples: int) -> Array:
     """A drive of the emulator, without sensor noise: what a recording would hold."""
-    quiet = np.random.default_rng(SEED).uniform(
-        -1, 1, (samples, made.model.plant.Ed.shape[1])
-    )
-    quiet[:, made.model.plant.n :] = (
-        0.0  # the columns behind the states' own are the sensors' noise
-    )
+    quiet = np.random.default_rng(SEED).uniform(-1, 1, (samples, made.model.plant.Ed.shape[1]))
+    quiet[:, made.model.plant.n :] = 0.0  # the columns behind the states' own are the sensors' noise
     trace = Batch(
         native,
         made,
@@ -77,11 +73,7 @@ def identified(made: Design, series: Array) -> list[tuple[str, float, float]]:
         if i > 1:
             ahead, before = col[f"speed{i - 1}_mps"], col[f"accel{i - 1}_mps2"]
             g = col[f"gap{i}_m"]
-            error = (
-                np.diff(g)
-                - period * (ahead - v)[:-1]
-                - period**2 / 2 * (before - a)[:-1]
-            )
+            error = np.diff(g) - period * (ahead - v)[:-1] - period**2 / 2 * (before - a)[:-1]
             row = model.plant.states.index(f"gap{i}_m")
             found.append(
                 (
@@ -117,23 +109,9 @@ def steps() -> list[FaultSpec]:
 
 def slow() -> list[FaultSpec]:
     """Faults that creep or hide: reported, not judged."""
-    faults = [
-        FaultSpec(s.format(i), "freeze", 0.0, 0, None)
-        for i in CARS
-        for s in ("speed{}_mps", "gap{}_m", "accel{}_mps2")
-        if not (i == 1 and s.startswith("gap"))
-    ]
-    faults += [
-        FaultSpec(f"accel{i}_mps2", "bias", size, 0, None)
-        for i in CARS
-        for size in (0.5, -0.5)
-    ]
-    return faults + [
-        FaultSpec(f"gap{i}_m", "drift", size, 0, None)
-        for i in CARS
-        if i > 1
-        for size in (0.1, -0.1)
-    ]
+    faults = [FaultSpec(s.format(i), "freeze", 0.0, 0, None) for i in CARS for s in ("speed{}_mps", "gap{}_m", "accel{}_mps2") if not (i == 1 and s.startswith("gap"))]
+    faults += [FaultSpec(f"accel{i}_mps2", "bias", size, 0, None) for i in CARS for size in (0.5, -0.5)]
+    return faults + [FaultSpec(f"gap{i}_m", "drift", size, 0, None) for i in CARS if i > 1 for size in (0.1, -0.1)]
 
 
 def table(title: str, faults: list[FaultSpec], delay: Array, within: int) -> Array:
@@ -142,11 +120,7 @@ def table(title: str, faults: list[FaultSpec], delay: Array, within: int) -> Arr
     print(title)
     for j, f in enumerate(faults):
         size = "" if f.kind == "freeze" else f":{f.size:g}"
-        mean = (
-            f"mean delay {delay[hit[:, j], j].mean():.2f}"
-            if hit[:, j].any()
-            else "never"
-        )
+        mean = f"mean delay {delay[hit[:, j], j].mean():.2f}" if hit[:, j].any() else "never"
         print(f"  {f.name}:{f.kind}{size:6s} {100 * hit[:, j].mean():7.2f} %   {mean}")
     print(f"  all: {100 * hit.mean():.3f} % of {hit.size} runs")
     return hit
@@ -154,9 +128,7 @@ def table(title: str, faults: list[FaultSpec], delay: Array, within: int) -> Arr
 
 def main() -> int:
     """Run all; 0 when every limit is met."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("csv", nargs="?")
     parser.add_argument("--generated", action="store_true")
     parser.add_argument(
@@ -186,15 +158,11 @@ def main() -> int:
     else:
         parser.error("give a recording, or --generated")
     failures: list[str] = []
-    print(
-        f"drive of {len(series)} samples, model hash {made.tables.hash:08x}, seed {SEED}"
-    )
+    print(f"drive of {len(series)} samples, model hash {made.tables.hash:08x}, seed {SEED}")
     print("bounds, identified on the first half:")
     for what, value, bound in identified(made, series):
         if value > bound:
-            failures.append(
-                f"{what}: {value:.4g} on the first half exceeds the model's {bound:.4g}"
-            )
+            failures.append(f"{what}: {value:.4g} on the first half exceeds the model's {bound:.4g}")
         if "disturbance" in what or value > bound:
             print(f"  {what}: {value:.5f} (model {bound:g})")
 
@@ -212,12 +180,8 @@ def main() -> int:
     trace = batch.trace(0)
     _, every, measured = periodic_bits(made, native, trace["reading"].tolist())
     groups = len(made.model.groups) - 1
-    print(
-        f"fault-free: {result['false_provisional']} provisional and {result['false_confirmed']} confirmed false alarms, largest |r|/J {result['margin']:.3f}"
-    )
-    print(
-        f"measurement frames: {100 * result['measurement'] / groups / len(series):.1f} % of periodic, intervals {result['interval_min']}..{result['interval_max']}"
-    )
+    print(f"fault-free: {result['false_provisional']} provisional and {result['false_confirmed']} confirmed false alarms, largest |r|/J {result['margin']:.3f}")
+    print(f"measurement frames: {100 * result['measurement'] / groups / len(series):.1f} % of periodic, intervals {result['interval_min']}..{result['interval_max']}")
     print(
         f"bits, all frames counted: {result['bits']} = {100 * result['bits'] / measured:.1f} % of the measurement groups sent periodically ({measured}), "
         f"{100 * result['bits'] / every:.1f} % with the tick counted on both sides"
@@ -237,26 +201,13 @@ def main() -> int:
         batch.sweep(faults, FIRST, STEP, starts, WITHIN + 1),
         WITHIN,
     )
-    missed = [
-        str(FaultSpec(f.name, f.kind, f.size, FIRST + STEP * int(s), None))
-        for s, j in np.argwhere(~hit)
-        for f in [faults[j]]
-    ]
+    missed = [str(FaultSpec(f.name, f.kind, f.size, FIRST + STEP * int(s), None)) for s, j in np.argwhere(~hit) for f in [faults[j]]]
     out = Path(args.misses)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text("".join(m + "\n" for m in missed))
-    print(
-        f"  {len(missed)} missed, listed in {out}"
-        + (
-            ": " + ", ".join(missed[:6]) + (" .." if len(missed) > 6 else "")
-            if missed
-            else ""
-        )
-    )
+    print(f"  {len(missed)} missed, listed in {out}" + (": " + ", ".join(missed[:6]) + (" .." if len(missed) > 6 else "") if missed else ""))
     if hit.mean() < FOUND:
-        failures.append(
-            f"{100 * hit.mean():.2f} % of the steps found, fewer than {100 * FOUND:.0f} %"
-        )
+        failures.append(f"{100 * hit.mean():.2f} % of the steps found, fewer than {100 * FOUND:.0f} %")
     creeping = slow()
     few = (len(series) - SLOW_WITHIN - FIRST - 2) // (10 * STEP) + 1
     table(

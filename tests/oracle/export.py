@@ -17,9 +17,7 @@ from hullguard.model import load_model
 def blocks(made: Design, rest: bool) -> list[tuple[str, Any]]:
     """(name, matrix) in the order of the file."""
     model, tables, plant = made.model, made.tables, made.model.plant
-    out: list[tuple[str, Any]] = [
-        (f"plant.{n}", getattr(plant, n)) for n in ("A", "B", "C", "D", "Ed", "Fd")
-    ]
+    out: list[tuple[str, Any]] = [(f"plant.{n}", getattr(plant, n)) for n in ("A", "B", "C", "D", "Ed", "Fd")]
     initial = np.abs(plant.equilibrium) + plant.initial_range
     out += [
         ("initial_range", initial[:, None]),
@@ -61,18 +59,14 @@ def blocks(made: Design, rest: bool) -> list[tuple[str, Any]]:
     out.append(("generators", [[len(made.generators)]]))
     for i, (g, t) in enumerate(zip(made.generators, tables.generators, strict=True)):
         name = f"gen{i}."
-        out += [
-            (name + n, getattr(g.observer, n)) for n in ("G", "H", "L", "W", "V", "Qu")
-        ]
+        out += [(name + n, getattr(g.observer, n)) for n in ("G", "H", "L", "W", "V", "Qu")]
         out += [
             (name + "Lo", g.filter.Lo),
             (name + "Mo", g.filter.Mo),
             (name + "outputs", [list(g.spec.outputs)]),
             (name + "inputs", [list(g.spec.inputs)]),
         ]
-        out += [
-            (name + n, getattr(g.plant, n)) for n in ("A", "B", "C", "D", "Ed", "Fd")
-        ]
+        out += [(name + n, getattr(g.plant, n)) for n in ("A", "B", "C", "D", "Ed", "Fd")]
         out += [
             (name + "initial", initial[:, None]),
             (name + "range", made.stored.state_range[:, None]),

@@ -20,7 +20,7 @@ from hullguard.design import hull
 from hullguard.design.arith import U32, digits, mul, nearest32, row_sums, up32
 from hullguard.design.observer import SubPlant
 from hullguard.design.tables import rows
-from hullguard.design.zonotope_table import BOX, ZonotopeTable
+from hullguard.design.zonotope_table import BOX, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
 
@@ -259,6 +259,8 @@ def build(
     constants = _constants(lin, T, plant, ranges) if published else _Constants(np.zeros((s, 0)), (np.zeros((s, 0)),) * 2, np.zeros(s), np.zeros(0))
     if derived is not None:
         lin = replace(lin, input=np.hstack([lin.input, mul(T, derived)]), direct=np.hstack([lin.direct, np.zeros((len(lin.direct), derived.shape[1]))]))
+    if reduction == TRUNCATE:
+        return _truncated(lin, radius, exact, constants, signal, columns)
     made = [_table(_scaled(c, lin, constants.every, radius), lin, radius, exact, constants, signal, columns, reduction) for c in coordinates(lin.state)]
     if not made:
         raise InputError(f"{where}: its poles are too close to one another for a zonotope; move them apart, or use the exact hull")
@@ -311,6 +313,13 @@ def _table(
         ready_moving=exact.ready_moving,
     )
     return table, _share(table, norm, radius, exact.steady)
+
+
+def _truncated(lin: hull.Linear, radius: Array, exact: hull.HullTables, constants: _Constants, signal: tuple[int, ...], columns: int) -> ZonotopeTable:
+    """As published: what is dropped is chosen by its length in the observer's own coordinates, and nothing is added for rounding."""
+    s, none = len(lin.state), np.zeros_like(lin.state)
+    table, _ = _table(Modal(np.eye(s), np.eye(s), none, (s,), False), lin, radius, exact, constants, signal, columns, TRUNCATE)
+    return replace(table, always=(0.0,) * s, growth=(0.0,) * s, output_growth=(0.0,) * len(lin.output), recover=NEVER)
 
 
 def _share(table: ZonotopeTable, norm: Array, radius: Array, steady: Array) -> float:
