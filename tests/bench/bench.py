@@ -47,29 +47,15 @@ def main() -> int:
         model = load_model(str(path))
         made = design(model)[0]
         for real in ("f32", "f64"):
-            batch = Batch(
-                Native(library(real), made.tables),
-                made,
-                SAMPLES,
-                model.scenarios[0].reference,
-                (),
-                1,
-                LOSS,
-            )
+            batch = Batch(Native(library(real), made.tables), made, SAMPLES, model.scenarios[0].reference, (), 1, LOSS)
             runs = max(1, int(speed(batch, 50) * SECONDS / SAMPLES))
             found = [speed(batch, runs) for _ in range(REPEATS)]
             median = statistics.median(found)
-            print(
-                f"{model.name:<10} {real:<5} {detector(made):<50} {median:15.3g}   {', '.join(f'{f:.3g}' for f in found)}",
-                flush=True,
-            )
+            print(f"{model.name:<10} {real:<5} {detector(made):<50} {median:15.3g}   {', '.join(f'{f:.3g}' for f in found)}", flush=True)
             if median < DEMANDED:
                 slow.append(f"{model.name} ({real})")
     if slow:
-        print(
-            f"below {DEMANDED:.0e} samples a second and core: {', '.join(slow)}",
-            file=sys.stderr,
-        )
+        print(f"below {DEMANDED:.0e} samples a second and core: {', '.join(slow)}", file=sys.stderr)
     return 1 if slow else 0
 
 

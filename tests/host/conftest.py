@@ -10,13 +10,7 @@ import hypothesis.core
 import pytest
 from host_support import ROOT, SEED, Cli, Models
 
-hypothesis.settings.register_profile(
-    "hullguard",
-    deadline=None,
-    database=None,
-    print_blob=True,
-    suppress_health_check=list(hypothesis.HealthCheck),
-)
+hypothesis.settings.register_profile("hullguard", deadline=None, database=None, print_blob=True, suppress_health_check=list(hypothesis.HealthCheck))
 hypothesis.settings.load_profile("hullguard")
 
 

@@ -38,22 +38,8 @@ class Ready:
     reference: Reference
     samples: int
 
-    def batch(
-        self,
-        samples: int,
-        faults: tuple[str, ...] = (),
-        seed: int = SEED,
-        **options: Any,
-    ) -> Batch:
-        return Batch(
-            self.native,
-            self.design,
-            samples,
-            self.reference,
-            [parse_fault(f) for f in faults],
-            seed,
-            **options,
-        )
+    def batch(self, samples: int, faults: tuple[str, ...] = (), seed: int = SEED, **options: Any) -> Batch:
+        return Batch(self.native, self.design, samples, self.reference, [parse_fault(f) for f in faults], seed, **options)
 
 
 class Models:
@@ -63,36 +49,20 @@ class Models:
         self._designs: dict[tuple[str, str, str], Design] = {}
         self._made: dict[tuple[str, str, str, str], Ready] = {}
 
-    def design(
-        self,
-        overrides: dict[str, Any] | None = None,
-        scenario: str = "rest",
-        name: str = "platoon",
-    ) -> Design:
+    def design(self, overrides: dict[str, Any] | None = None, scenario: str = "rest", name: str = "platoon") -> Design:
         key = (name, json.dumps(overrides or {}, sort_keys=True), scenario)
         if key not in self._designs:
             self._designs[key] = design(load_model(name, overrides, scenario))[0]
         return self._designs[key]
 
-    def platoon(
-        self,
-        scenario: str = "rest",
-        overrides: dict[str, Any] | None = None,
-        real: str = "f32",
-        lib: Library | None = None,
-    ) -> Ready:
+    def platoon(self, scenario: str = "rest", overrides: dict[str, Any] | None = None, real: str = "f32", lib: Library | None = None) -> Ready:
         made = self.design(overrides, scenario)
         chosen = made.model.scenario(scenario)
         key = ("platoon", json.dumps(overrides or {}, sort_keys=True), scenario, real)
         if lib is not None:
             return Ready(made, Native(lib, made.tables), chosen.reference, chosen.samples)
         if key not in self._made:
-            self._made[key] = Ready(
-                made,
-                Native(library(real), made.tables),
-                chosen.reference,
-                chosen.samples,
-            )
+            self._made[key] = Ready(made, Native(library(real), made.tables), chosen.reference, chosen.samples)
         return self._made[key]
 
 
@@ -105,10 +75,7 @@ class Alarms:
 
 
 def alarms(rows: list[dict[str, Any]]) -> Alarms:
-    return Alarms(
-        sum(r["false_provisional"] > 0 for r in rows),
-        sum(r["false_confirmed"] > 0 for r in rows),
-    )
+    return Alarms(sum(r["false_provisional"] > 0 for r in rows), sum(r["false_confirmed"] > 0 for r in rows))
 
 
 @dataclass(frozen=True)
@@ -148,20 +115,11 @@ INCLUDE = ("-I", str(ROOT / "firmware" / "include"))
 FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fPIC")
 
 
-def build_library(
-    folder: Path,
-    real: str,
-    patch: dict[str, list[tuple[str, str]]] | None = None,
-    extra: str = "",
-    includes: tuple[str, ...] = (),
-) -> Library:
+def build_library(folder: Path, real: str, patch: dict[str, list[tuple[str, str]]] | None = None, extra: str = "", includes: tuple[str, ...] = ()) -> Library:
     """A library from a copy of the sources. `patch`: file name -> (text that must be there exactly once, what replaces it); `extra`: more C."""
     source = folder / "src"
     source.mkdir(parents=True)
-    for origin in (
-        ROOT / "firmware" / "src",
-        ROOT / "host_tools" / "hullguard" / "core",
-    ):
+    for origin in (ROOT / "firmware" / "src", ROOT / "host_tools" / "hullguard" / "core"):
         for file in (*origin.glob("*.c"), *origin.glob("*.h")):
             shutil.copy(file, source / file.name)
     for name, changes in (patch or {}).items():
@@ -175,41 +133,9 @@ def build_library(
     defined = f"-DHG_REAL_{real.upper()}=1"
     shared = folder / f"libhullguard_{real}.so"
     files = [str(f) for f in sorted(source.glob("*.c"))]
-    subprocess.run(
-        [
-            "gcc",
-            *FLAGS,
-            defined,
-            *INCLUDE,
-            "-I",
-            str(source),
-            *includes,
-            "-shared",
-            "-Wl,--no-undefined",
-            "-o",
-            str(shared),
-            *files,
-            "-lm",
-        ],
-        check=True,
-    )
+    subprocess.run(["gcc", *FLAGS, defined, *INCLUDE, "-I", str(source), *includes, "-shared", "-Wl,--no-undefined", "-o", str(shared), *files, "-lm"], check=True)
     declare = ROOT / "host_tools" / "hullguard" / "core" / "declare"
-    done = subprocess.run(
-        [
-            "gcc",
-            "-E",
-            "-P",
-            "-nostdinc",
-            defined,
-            "-I",
-            str(declare),
-            *INCLUDE,
-            str(source / "host.h"),
-        ],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
+    done = subprocess.run(["gcc", "-E", "-P", "-nostdinc", defined, "-I", str(declare), *INCLUDE, str(source / "host.h")], check=True, capture_output=True, text=True)
     (folder / f"hullguard_{real}.i").write_text(done.stdout, encoding="utf-8")
     return Library(real, folder)
 
@@ -247,16 +173,7 @@ def classic_bits(frame: Frame) -> int:
     """Start of frame to interframe space of a classic frame (ISO 11898-1)."""
     remote = int(bool(frame.flags & REMOTE))
     if frame.flags & EXTENDED:
-        header = [
-            0,
-            *binary(frame.id >> 18, 11),
-            1,
-            1,
-            *binary(frame.id & 0x3FFFF, 18),
-            remote,
-            0,
-            0,
-        ]
+        header = [0, *binary(frame.id >> 18, 11), 1, 1, *binary(frame.id & 0x3FFFF, 18), remote, 0, 0]
     else:
         header = [0, *binary(frame.id, 11), remote, 0, 0]
     bits = header + binary(len(frame.data), 4) + [b for byte in frame.data for b in binary(byte, 8)]

@@ -48,10 +48,7 @@ def given_model(tmp_path: Path, cli: Cli) -> Any:
 
     def run(changed: dict[str, Any] | str, *arguments: object, command: str = "run") -> Result:
         path = tmp_path / "mine.toml"
-        path.write_text(
-            changed if isinstance(changed, str) else tomli_w.dumps(changed),
-            encoding="utf-8",
-        )
+        path.write_text(changed if isinstance(changed, str) else tomli_w.dumps(changed), encoding="utf-8")
         (tmp_path / "mine.design.toml").write_text(DESIGNED, encoding="utf-8")
         more = arguments or ("--bus", "inprocess", "--samples", 10, "--no-fault", "-q")
         return cli(command, path, *more)
@@ -149,20 +146,7 @@ NUMBERS = [
     ("verdict", "debounce", "up"), ("detector", "observers", 0, "order"), ("detector", "observers", 0, "search", "trials"), ("scenarios", 0, "samples"),
     ("scenarios", 0, "reference", "amplitude"),
 ]  # fmt: skip
-NO_NUMBERS = [
-    float("nan"),
-    float("inf"),
-    "1.0",
-    True,
-    {},
-    [[1.0]],
-    [],
-    -1e30,
-    ["a", "b"],
-    [float("nan")] * 3,
-    10**400,
-    1e300,
-]
+NO_NUMBERS = [float("nan"), float("inf"), "1.0", True, {}, [[1.0]], [], -1e30, ["a", "b"], [float("nan")] * 3, 10**400, 1e300]
 
 
 @pytest.mark.parametrize("path", NUMBERS, ids=[".".join(map(str, p)) for p in NUMBERS])
@@ -215,20 +199,13 @@ SHAPES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "word"),
-    SHAPES,
-    ids=[f"{'.'.join(map(str, p))}={v}" for p, v, _ in SHAPES],
-)
+@pytest.mark.parametrize(("path", "value", "word"), SHAPES, ids=[f"{'.'.join(map(str, p))}={v}" for p, v, _ in SHAPES])
 def test_a_wrong_shape_or_choice_is_refused_and_what_would_do_is_named(given_model: Any, data: dict[str, Any], path: tuple[Any, ...], value: Any, word: str) -> None:
     at(data, path[:-1])[path[-1]] = value
     refused(given_model(data), BAD, word)
 
 
-@pytest.mark.parametrize(
-    "members",
-    [["gap12_m", "gap23_m"], ["gap12_m", "gap23_m", "speed1_mps", "speed1_mps"]],
-)
+@pytest.mark.parametrize("members", [["gap12_m", "gap23_m"], ["gap12_m", "gap23_m", "speed1_mps", "speed1_mps"]])
 def test_a_signal_in_no_group_or_in_one_twice_is_refused(given_model: Any, data: dict[str, Any], members: list[str]) -> None:
     data["groups"][0]["signals"] = members
     data["groups"][0]["trigger"]["sigma"] = 0.05
@@ -246,10 +223,7 @@ def test_a_name_that_is_there_twice_is_refused(given_model: Any, data: dict[str,
     refused(given_model(data), BAD, value)
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [(("groups", 1), 0x110), (("verdict",), 0x110), (("verdict",), 0x120)],
-)
+@pytest.mark.parametrize(("path", "value"), [(("groups", 1), 0x110), (("verdict",), 0x110), (("verdict",), 0x120)])
 def test_an_identifier_that_is_there_twice_is_refused(given_model: Any, data: dict[str, Any], path: tuple[Any, ...], value: int) -> None:
     at(data, path)["frame"]["id"] = value
     refused(given_model(data), BAD, f"0x{value:X}")
@@ -305,9 +279,7 @@ def test_the_small_model_is_good(own_model: Any) -> None:
     assert own_model(dense()).status == DONE
 
 
-def test_an_unobservable_plant_is_refused_and_the_hidden_state_named(
-    own_model: Any,
-) -> None:
+def test_an_unobservable_plant_is_refused_and_the_hidden_state_named(own_model: Any) -> None:
     source = dense(plant__A=[[0.9, 0.0], [0.0, 0.8]], plant__states=["seen", "hidden"])
     refused(own_model(source), BAD, "not observable", "'hidden'", "measure it")
 
@@ -324,14 +296,8 @@ def test_two_equal_outputs_are_refused(given_model: Any) -> None:
     assert given_model(source).status == BAD
 
 
-def test_an_order_without_a_parity_vector_is_refused_and_the_one_that_would_do_is_named(
-    own_model: Any,
-) -> None:
-    text = refused(
-        own_model(dense(detector__observers__0__order=1)),
-        BAD,
-        "no parity vector at order 1",
-    )
+def test_an_order_without_a_parity_vector_is_refused_and_the_one_that_would_do_is_named(own_model: Any) -> None:
+    text = refused(own_model(dense(detector__observers__0__order=1)), BAD, "no parity vector at order 1")
     assert "smallest order that has one is 2" in text
 
 
@@ -339,31 +305,15 @@ def test_an_unstable_plant_without_declared_slews_is_refused(own_model: Any) -> 
     refused(own_model(dense(plant__A=[[1.1, 0.1], [0.0, 0.8]])), BAD, "stable loop")
 
 
-def test_a_reach_beyond_the_range_is_refused_and_the_range_that_would_do_is_named(
-    own_model: Any,
-) -> None:
-    text = refused(
-        own_model(dense(signals__0__range=[-0.05, 0.05])),
-        BAD,
-        "reach of y",
-        "make its range",
-    )
+def test_a_reach_beyond_the_range_is_refused_and_the_range_that_would_do_is_named(own_model: Any) -> None:
+    text = refused(own_model(dense(signals__0__range=[-0.05, 0.05])), BAD, "reach of y", "make its range")
     low, high = (float(x) for x in text.split("make its range ")[1].split(" or wider")[0].split(" .. "))
     assert own_model(dense(signals__0__range=[1.01 * low, 1.01 * high])).status == DONE
 
 
 @pytest.mark.parametrize("low_high", [[-1e6, 1e6], [-20000.0, 20000.0]])
 def test_a_range_that_does_not_fit_its_frame_is_refused(own_model: Any, low_high: list[float]) -> None:
-    refused(
-        own_model(
-            dense(
-                signals__0__range=low_high,
-                signals__0__resolution=1e-3 if low_high[1] < 1e6 else 1e-6,
-            )
-        ),
-        BAD,
-        "coarser",
-    )
+    refused(own_model(dense(signals__0__range=low_high, signals__0__resolution=1e-3 if low_high[1] < 1e6 else 1e-6)), BAD, "coarser")
 
 
 def test_a_group_that_does_not_fit_its_frame_is_refused_with_the_way_out(given_model: Any, data: dict[str, Any]) -> None:
@@ -390,25 +340,11 @@ def test_a_counter_that_hides_sixteen_lost_frames_is_refused_and_the_limit_named
 
 def test_a_broken_design_file_is_refused_or_made_anew(tmp_path: Path, cli: Cli) -> None:
     (tmp_path / "mine.toml").write_text(PLATOON, encoding="utf-8")
-    run = (
-        "run",
-        tmp_path / "mine.toml",
-        "--bus",
-        "inprocess",
-        "--samples",
-        5,
-        "--no-fault",
-        "-q",
-        "--set",
-        "detector.observers.0.search.trials=5",
-    )
+    run = ("run", tmp_path / "mine.toml", "--bus", "inprocess", "--samples", 5, "--no-fault", "-q", "--set", "detector.observers.0.search.trials=5")
     for text in ("x = [", DESIGNED[:1000], DESIGNED.replace("gamma", "gama"), "\x00"):
         (tmp_path / "mine.design.toml").write_text(text, encoding="utf-8")
         refused(cli(*run), BAD, "mine.design.toml")
-    for text in (
-        "version = 1\n",
-        "version = 99\n",
-    ):  # of another version: its numbers are not today's, and are found again
+    for text in ("version = 1\n", "version = 99\n"):  # of another version: its numbers are not today's, and are found again
         (tmp_path / "mine.design.toml").write_text(text, encoding="utf-8")
         assert cli(*run).status == DONE
 
@@ -468,22 +404,7 @@ def test_a_bad_option_is_refused_in_one_line(cli: Cli, arguments: tuple[object, 
 def test_an_out_folder_that_is_a_file_is_refused(cli: Cli, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="ascii")
     refused(cli(*RUN, "--out", tmp_path / "file"), BAD, "file")
-    refused(
-        cli(
-            "campaign",
-            "platoon",
-            "--runs",
-            1,
-            "--samples",
-            5,
-            "--no-fault",
-            "-q",
-            "--out",
-            tmp_path / "file",
-        ),
-        BAD,
-        "file",
-    )
+    refused(cli("campaign", "platoon", "--runs", 1, "--samples", 5, "--no-fault", "-q", "--out", tmp_path / "file"), BAD, "file")
     refused(cli("design", "platoon", "-q", "--out", tmp_path / "file"), BAD, "file")
 
 
@@ -498,60 +419,18 @@ FAULTS = [
 
 @pytest.mark.parametrize(("spec", "word"), FAULTS)
 def test_a_wrong_fault_is_refused_with_what_would_do(cli: Cli, spec: str, word: str) -> None:
-    refused(
-        cli(
-            "run",
-            "platoon",
-            "--bus",
-            "inprocess",
-            "--samples",
-            30,
-            "-q",
-            "--fault",
-            spec,
-        ),
-        BAD,
-        "fault" if "controller9" not in spec else "neither",
-        word,
-    )
+    refused(cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", "--fault", spec), BAD, "fault" if "controller9" not in spec else "neither", word)
 
 
 def test_more_faults_than_the_emulator_holds_are_refused(cli: Cli) -> None:
     many = [x for i in range(33) for x in ("--fault", f"gap12_m:bias:0.1@{i}")]
-    refused(
-        cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", *many),
-        BAD,
-        "32",
-    )
+    refused(cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", *many), BAD, "32")
     refused(cli("campaign", "platoon", "--runs", 1, "--samples", 30, "-q", *many), BAD, "32")
 
 
 def test_a_fault_far_ahead_ends_where_it_says(cli: Cli) -> None:
-    assert (
-        cli(
-            "run",
-            "platoon",
-            "--bus",
-            "inprocess",
-            "--samples",
-            30,
-            "-q",
-            "--fault",
-            "gap12_m:bias:0.1@3..99999999999999",
-        ).status
-        == DONE
-    )
-    huge = cli(
-        "run",
-        "platoon",
-        "--bus",
-        "inprocess",
-        "--samples",
-        30,
-        "-q",
-        "--fault",
-        "gap12_m:bias:0.1@3..99999999999999999999",
-    )
+    assert cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", "--fault", "gap12_m:bias:0.1@3..99999999999999").status == DONE
+    huge = cli("run", "platoon", "--bus", "inprocess", "--samples", 30, "-q", "--fault", "gap12_m:bias:0.1@3..99999999999999999999")
     assert huge.status in (DONE, BAD)
     assert "Traceback" not in huge.err
 
@@ -560,11 +439,7 @@ def test_a_fault_far_ahead_ends_where_it_says(cli: Cli) -> None:
 def test_a_bus_that_does_not_exist_is_status_3(cli: Cli, bus: str) -> None:
     text = refused(cli("run", "platoon", "--bus", bus, "--no-fault", "-q"), NO_BUS, bus)
     assert "ip link add" in text or "this kernel has no CAN" in text
-    refused(
-        cli("run", "platoon", "-i", "socketcan", "-c", bus, "--no-fault", "-q"),
-        NO_BUS,
-        bus,
-    )
+    refused(cli("run", "platoon", "-i", "socketcan", "-c", bus, "--no-fault", "-q"), NO_BUS, bus)
     refused(cli("detect", "platoon", "-i", "socketcan", "-c", bus, "-q"), NO_BUS, bus)
     refused(cli("plant", "platoon", "-i", "socketcan", "-c", bus, "-q"), NO_BUS, bus)
 
@@ -577,76 +452,23 @@ def test_an_interface_that_python_can_does_not_know_is_status_3(cli: Cli) -> Non
 
 def test_expectations_that_are_not_met_are_status_1(cli: Cli) -> None:
     base = ("run", "platoon", "--bus", "inprocess", "-q")
-    refused(
-        cli(*base, "--samples", 60, "--no-fault", "--expect", "detect"),
-        FAILED,
-        "no fault",
-    )
-    refused(
-        cli(
-            *base,
-            "--samples",
-            60,
-            "--fault",
-            "controller2:bias:0.001@10",
-            "--expect",
-            "detect",
-        ),
-        FAILED,
-        "controller2:bias:0.001@10",
-    )
-    refused(
-        cli(
-            *base,
-            "--samples",
-            60,
-            "--fault",
-            "controller2:bias:3@10",
-            "--expect",
-            "quiet",
-        ),
-        FAILED,
-        "alarm",
-    )
-    assert (
-        cli(
-            *base,
-            "--samples",
-            60,
-            "--fault",
-            "controller2:bias:3@10",
-            "--expect",
-            "detect",
-        ).status
-        == DONE
-    )
+    refused(cli(*base, "--samples", 60, "--no-fault", "--expect", "detect"), FAILED, "no fault")
+    refused(cli(*base, "--samples", 60, "--fault", "controller2:bias:0.001@10", "--expect", "detect"), FAILED, "controller2:bias:0.001@10")
+    refused(cli(*base, "--samples", 60, "--fault", "controller2:bias:3@10", "--expect", "quiet"), FAILED, "alarm")
+    assert cli(*base, "--samples", 60, "--fault", "controller2:bias:3@10", "--expect", "detect").status == DONE
     assert cli(*base, "--samples", 60, "--no-fault", "--expect", "quiet").status == DONE
     few = ("campaign", "platoon", "--runs", 3, "--samples", 60, "--workers", 1, "-q")
     refused(cli(*few, "--no-fault", "--expect", "detect"), FAILED, "expected")
-    refused(
-        cli(*few, "--fault", "controller2:bias:3@10", "--expect", "quiet"),
-        FAILED,
-        "expected",
-    )
+    refused(cli(*few, "--fault", "controller2:bias:3@10", "--expect", "quiet"), FAILED, "expected")
 
 
 # ---- recordings and logs ----
 
-NAMES = (
-    "gap12_m",
-    "gap23_m",
-    "speed1_mps",
-    "control1_mps2",
-    "control2_mps2",
-    "control3_mps2",
-)
+NAMES = ("gap12_m", "gap23_m", "speed1_mps", "control1_mps2", "control2_mps2", "control3_mps2")
 
 
 def recording(rows: int = 12) -> list[list[str]]:
-    return [
-        ["time_s", *NAMES],
-        *[[f"{k * 0.1:.3f}", *["0.0"] * 6] for k in range(rows)],
-    ]
+    return [["time_s", *NAMES], *[[f"{k * 0.1:.3f}", *["0.0"] * 6] for k in range(rows)]]
 
 
 def changed(row: int, column: int, text: str) -> list[list[str]]:
@@ -677,58 +499,24 @@ CSVS: list[tuple[str, Any, str]] = [
 def test_a_broken_recording_is_refused_with_its_place(cli: Cli, tmp_path: Path, table: list[list[str]], word: str) -> None:
     path = tmp_path / "rec.csv"
     path.write_text("".join(",".join(r) + "\n" for r in table), encoding="utf-8")
-    refused(
-        cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q"),
-        BAD,
-        "rec.csv",
-        word,
-    )
+    refused(cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q"), BAD, "rec.csv", word)
 
 
 def test_a_good_recording_is_replayed(cli: Cli, tmp_path: Path) -> None:
     path = tmp_path / "rec.csv"
     path.write_text("".join(",".join(r) + "\n" for r in recording()), encoding="utf-8")
-    assert (
-        cli(
-            "replay",
-            "platoon",
-            "--csv",
-            path,
-            "--bus",
-            "inprocess",
-            "-q",
-            "--expect",
-            "quiet",
-        ).status
-        == DONE
-    )
-    refused(
-        cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q", "--seed", -1),
-        BAD,
-        "--seed",
-    )
-    refused(
-        cli("replay", "platoon", "--csv", tmp_path, "--bus", "inprocess", "-q"),
-        BAD,
-        str(tmp_path),
-    )
+    assert cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q", "--expect", "quiet").status == DONE
+    refused(cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q", "--seed", -1), BAD, "--seed")
+    refused(cli("replay", "platoon", "--csv", tmp_path, "--bus", "inprocess", "-q"), BAD, str(tmp_path))
 
 
 def test_a_binary_file_is_no_recording_and_no_log(cli: Cli, tmp_path: Path) -> None:
     path = tmp_path / "x.bin"
     path.write_bytes(bytes(range(256)) * 4)
-    refused(
-        cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q"),
-        BAD,
-        "x.bin",
-    )
+    refused(cli("replay", "platoon", "--csv", path, "--bus", "inprocess", "-q"), BAD, "x.bin")
     refused(cli("detect", "platoon", "--log", path, "-q"), BAD, "x.bin")
     path.write_bytes(b"\xff\xfe\x00")
-    refused(
-        cli("run", path.rename(tmp_path / "x.toml"), "--bus", "inprocess", "-q"),
-        BAD,
-        "x.toml",
-    )
+    refused(cli("run", path.rename(tmp_path / "x.toml"), "--bus", "inprocess", "-q"), BAD, "x.toml")
 
 
 GARBAGE = [
@@ -746,17 +534,7 @@ def test_a_garbage_line_in_a_log_is_refused_with_its_number(cli: Cli, tmp_path: 
 
 def test_a_log_of_every_kind_of_foreign_frame_is_read_and_raises_no_alarm(cli: Cli, tmp_path: Path) -> None:
     path = tmp_path / "x.log"
-    lines = [
-        "110#",
-        "110#R",
-        "00000110#0011223344556677",
-        "110##10011223344556677",
-        "20000040#0000000000000000",
-        "7FF#00",
-        "FFFFFFFF#00",
-        "120#0011223344556677",
-        "FFF#00",
-    ]
+    lines = ["110#", "110#R", "00000110#0011223344556677", "110##10011223344556677", "20000040#0000000000000000", "7FF#00", "FFFFFFFF#00", "120#0011223344556677", "FFF#00"]
     path.write_text("".join(f"({i}.0) vcan0 {x}\n" for i, x in enumerate(lines)), encoding="ascii")
     result = cli("detect", "platoon", "--log", path, "--json", "-q", "--expect", "quiet")
     assert result.status == DONE
@@ -797,9 +575,7 @@ def test_no_value_anywhere_in_a_model_does_anything_but_pass_or_be_refused(path:
 
 @settings(max_examples=200)
 @given(st.text(max_size=60))
-def test_no_text_does_anything_as_a_fault_or_override_but_pass_or_be_refused(
-    text: str,
-) -> None:
+def test_no_text_does_anything_as_a_fault_or_override_but_pass_or_be_refused(text: str) -> None:
     for parse in (parse_fault, parse_override):
         try:
             parse(text)
@@ -813,16 +589,7 @@ def test_no_text_does_anything_as_a_fault_or_override_but_pass_or_be_refused(
 
 # ---- frames ----
 
-OK, E_NUMERIC, E_FORMAT, E_ID, E_CRC, E_REPEATED, E_STAMP, E_BUSY = (
-    1,
-    -4,
-    -5,
-    -6,
-    -7,
-    -8,
-    -9,
-    -11,
-)
+OK, E_NUMERIC, E_FORMAT, E_ID, E_CRC, E_REPEATED, E_STAMP, E_BUSY = 1, -4, -5, -6, -7, -8, -9, -11
 EXTENDED, REMOTE, FD, BRS, ERROR = 1, 2, 4, 8, 16
 
 
@@ -832,18 +599,11 @@ class Line:
     def __init__(self, models: Models) -> None:
         ready = models.platoon("manoeuvres")
         self.plant = Plant(ready.native, ready.design, ready.reference, [], SEED)
-        self.sender, self.node, self.k = (
-            Sender(ready.native),
-            Node(ready.native, REST),
-            0,
-        )
+        self.sender, self.node, self.k = Sender(ready.native), Node(ready.native, REST), 0
 
     def frames(self) -> tuple[Frame | None, Frame]:
         reading = self.plant.read()
-        measured, closing = (
-            self.sender.step(0, self.k, reading),
-            self.sender.step(1, self.k, reading),
-        )
+        measured, closing = self.sender.step(0, self.k, reading), self.sender.step(1, self.k, reading)
         assert closing is not None
         self.plant.move()
         self.k += 1
@@ -921,11 +681,7 @@ KINDS = [
 
 
 @pytest.mark.parametrize("group", [0, 1])
-@pytest.mark.parametrize(
-    ("flags", "length", "status", "counter"),
-    [k[1:] for k in KINDS],
-    ids=[k[0] for k in KINDS],
-)
+@pytest.mark.parametrize(("flags", "length", "status", "counter"), [k[1:] for k in KINDS], ids=[k[0] for k in KINDS])
 def test_no_frame_of_another_kind_or_length_is_taken(models: Models, group: int, flags: int, length: int, status: int, counter: str) -> None:
     line = Line(models)
     pair = line.until_measured()
@@ -964,9 +720,7 @@ def test_a_repeated_frame_is_refused_once_and_counted(models: Models) -> None:
     assert line.node.receive(closing) == E_REPEATED
 
 
-def test_a_measurement_of_another_sample_is_refused_as_early_or_late(
-    models: Models,
-) -> None:
+def test_a_measurement_of_another_sample_is_refused_as_early_or_late(models: Models) -> None:
     line = Line(models)
     first = line.until_measured()
     assert line.node.receive(first[1]) == OK  # closes the sample; its measurement comes too late
@@ -976,11 +730,7 @@ def test_a_measurement_of_another_sample_is_refused_as_early_or_late(
 
 
 @settings(max_examples=300)
-@given(
-    st.integers(0, 0x1FFFFFFF) | st.sampled_from([0x110, 0x120, 0x130, 0x131]),
-    st.integers(0, 255),
-    st.binary(max_size=64),
-)
+@given(st.integers(0, 0x1FFFFFFF) | st.sampled_from([0x110, 0x120, 0x130, 0x131]), st.integers(0, 255), st.binary(max_size=64))
 def test_no_arbitrary_frame_is_taken_or_raises_an_alarm(models: Models, number: int, flags: int, data: bytes) -> None:
     line = Line(models)
     before = line.node.health()["good"]
@@ -998,15 +748,5 @@ def test_no_arbitrary_frame_is_taken_or_raises_an_alarm(models: Models, number: 
 
 def test_the_status_numbers_of_this_file_are_those_of_the_library() -> None:
     lib = library("f32").lib
-    assert (
-        lib.HG_OK,
-        lib.HG_E_NUMERIC,
-        lib.HG_E_FORMAT,
-        lib.HG_E_ID,
-        lib.HG_E_CRC,
-    ) == (OK, E_NUMERIC, E_FORMAT, E_ID, E_CRC)
-    assert (lib.HG_E_REPEATED, lib.HG_E_STAMP, lib.HG_E_BUSY) == (
-        E_REPEATED,
-        E_STAMP,
-        E_BUSY,
-    )
+    assert (lib.HG_OK, lib.HG_E_NUMERIC, lib.HG_E_FORMAT, lib.HG_E_ID, lib.HG_E_CRC) == (OK, E_NUMERIC, E_FORMAT, E_ID, E_CRC)
+    assert (lib.HG_E_REPEATED, lib.HG_E_STAMP, lib.HG_E_BUSY) == (E_REPEATED, E_STAMP, E_BUSY)

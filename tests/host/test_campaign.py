@@ -39,30 +39,13 @@ from hullguard.model import parse_fault
 from hullguard.model.schema import SHIPPED
 
 FAULT = "controller2:bias:1@40"
-ADAPTIVE = {
-    "groups.measurement.trigger.silence": [0, 1],
-    "groups.measurement.trigger.delta": [0.02, 0.05],
-    "groups.measurement.trigger.levels": 4,
-}
+ADAPTIVE = {"groups.measurement.trigger.silence": [0, 1], "groups.measurement.trigger.delta": [0.02, 0.05], "groups.measurement.trigger.levels": 4}
 
 
-def case_of(
-    models: Models,
-    overrides: dict[str, Any] | None = None,
-    faults: Sequence[str] = (),
-    real: str = "f32",
-    **changes: Any,
-) -> Case:
+def case_of(models: Models, overrides: dict[str, Any] | None = None, faults: Sequence[str] = (), real: str = "f32", **changes: Any) -> Case:
     made = models.design(overrides, "manoeuvres")
     reference = made.model.scenario("manoeuvres").reference
-    return Case(
-        setup_of(made, real),
-        changes.pop("samples", 100),
-        reference,
-        tuple(parse_fault(f) for f in faults),
-        SEED,
-        **changes,
-    )
+    return Case(setup_of(made, real), changes.pop("samples", 100), reference, tuple(parse_fault(f) for f in faults), SEED, **changes)
 
 
 def same(a: Sequence[Rows], b: Sequence[Rows]) -> bool:
@@ -75,102 +58,28 @@ def files(folder: Path) -> dict[str, bytes]:
 
 # ---- the grid ----
 
-GRID = (
-    "--vary",
-    "groups.measurement.trigger.silence=0,1",
-    "--loss",
-    "0,0.2",
-    "--size",
-    "0.5,1,2",
-    "--each-fault",
-    "--fault",
-    FAULT,
-    "--fault",
-    "gap12_m:bias:3@50",
-)
-FEW = (
-    "campaign",
-    "platoon",
-    "--scenario",
-    "manoeuvres",
-    "--samples",
-    "80",
-    "--workers",
-    "1",
-    "--json",
-    "-q",
-    "--seed",
-    "7",
-)
+GRID = ("--vary", "groups.measurement.trigger.silence=0,1", "--loss", "0,0.2", "--size", "0.5,1,2", "--each-fault", "--fault", FAULT, "--fault", "gap12_m:bias:3@50")
+FEW = ("campaign", "platoon", "--scenario", "manoeuvres", "--samples", "80", "--workers", "1", "--json", "-q", "--seed", "7")
 
 
-def test_a_grid_has_a_case_for_every_combination_and_each_is_the_campaign_of_its_own(
-    cli: Cli,
-) -> None:
+def test_a_grid_has_a_case_for_every_combination_and_each_is_the_campaign_of_its_own(cli: Cli) -> None:
     found = cli(*FEW, "--runs", 4, *GRID).json
     cases = found["cases"]
     silences = [c["groups.measurement.trigger.silence"] for c in cases]
-    spans = itertools.product(
-        (0, 1),
-        (
-            "controller2:bias:0.5@40",
-            "controller2:bias:1@40",
-            "controller2:bias:2@40",
-            "gap12_m:bias:0.5@50",
-            "gap12_m:bias:1@50",
-            "gap12_m:bias:2@50",
-        ),
-        (0.0, 0.2),
-    )
-    assert list(
-        zip(
-            silences,
-            [c["fault"] for c in cases],
-            [c["loss"] for c in cases],
-            strict=True,
-        )
-    ) == list(spans)
+    spans = itertools.product((0, 1), ("controller2:bias:0.5@40", "controller2:bias:1@40", "controller2:bias:2@40", "gap12_m:bias:0.5@50", "gap12_m:bias:1@50", "gap12_m:bias:2@50"), (0.0, 0.2))
+    assert list(zip(silences, [c["fault"] for c in cases], [c["loss"] for c in cases], strict=True)) == list(spans)
     assert (found["runs"], len(found["rows"])) == (4 * 24, 4 * 24)
     assert len({c["name"] for c in cases}) == 24
     for c in (cases[5], cases[22]):
-        one = (
-            "--set",
-            f"groups.measurement.trigger.silence={c['groups.measurement.trigger.silence']}",
-            "--loss",
-            c["loss"],
-            "--fault",
-            c["fault"],
-        )
+        one = ("--set", f"groups.measurement.trigger.silence={c['groups.measurement.trigger.silence']}", "--loss", c["loss"], "--fault", c["fault"])
         alone = cli(*FEW, "--runs", 4, *one).json
         assert alone["rows"] == [{k: v for k, v in r.items() if k != "case"} for r in found["rows"] if r["case"] == c["case"]]
         assert alone["model_hash"] == c["model_hash"]
-        assert all(
-            alone[k] == c[k]
-            for k in (
-                "runs",
-                "detected_runs",
-                "delay_mean",
-                "delay_p10",
-                "delay_p90",
-                "measurement_share",
-                "bits_mean",
-                "frames_lost",
-            )
-        )
+        assert all(alone[k] == c[k] for k in ("runs", "detected_runs", "delay_mean", "delay_p10", "delay_p90", "measurement_share", "bits_mean", "frames_lost"))
 
 
 def test_faults_of_one_run_stay_together_without_each_fault(cli: Cli) -> None:
-    found = cli(
-        *FEW,
-        "--runs",
-        1,
-        "--fault",
-        FAULT,
-        "--fault",
-        "gap12_m:bias:3@50",
-        "--size",
-        "2,4",
-    ).json
+    found = cli(*FEW, "--runs", 1, "--fault", FAULT, "--fault", "gap12_m:bias:3@50", "--size", "2,4").json
     assert [c["faults"] for c in found["cases"]] == [[f"controller2:bias:{s}@40", f"gap12_m:bias:{s}@50"] for s in (2, 4)]
 
 
@@ -193,18 +102,7 @@ BAD: list[tuple[tuple[object, ...], str]] = [
 
 @pytest.mark.parametrize(("options", "word"), BAD, ids=[" ".join(map(str, o)) for o, _ in BAD])
 def test_a_grid_that_makes_no_sense_is_refused_in_one_line(cli: Cli, options: tuple[object, ...], word: str) -> None:
-    result = cli(
-        "campaign",
-        "platoon",
-        "--scenario",
-        "rest",
-        "--runs",
-        1,
-        "--samples",
-        20,
-        "-q",
-        *options,
-    )
+    result = cli("campaign", "platoon", "--scenario", "rest", "--runs", 1, "--samples", 20, "-q", *options)
     assert (result.status, result.out) == (2, ""), result
     assert len(result.err.strip().splitlines()) == 1
     assert word in result.err
@@ -213,21 +111,13 @@ def test_a_grid_that_makes_no_sense_is_refused_in_one_line(cli: Cli, options: tu
 # ---- spread and interrupted ----
 
 
-def test_results_depend_neither_on_the_workers_nor_on_the_chunks(
-    models: Models,
-) -> None:
-    cases = [
-        case_of(models, faults=[FAULT], loss=0.1, burst=3, attack=0.2),
-        case_of(models, SILENT_1, loss=0.1),
-    ]
+def test_results_depend_neither_on_the_workers_nor_on_the_chunks(models: Models) -> None:
+    cases = [case_of(models, faults=[FAULT], loss=0.1, burst=3, attack=0.2), case_of(models, SILENT_1, loss=0.1)]
     once = campaign(cases, 20, serial)
     assert [r["run"].tolist() for r in once] == [list(range(20))] * 2
     assert same(campaign(cases, 20, serial, size=1), once)
     for workers, size in ((1, 7), (2, 20), (3, 4)):
-        assert same(campaign(cases, 20, processes(workers), size=size), once), (
-            workers,
-            size,
-        )
+        assert same(campaign(cases, 20, processes(workers), size=size), once), (workers, size)
 
 
 def test_a_case_is_equal_to_its_copy_and_to_no_other(models: Models) -> None:
@@ -283,31 +173,10 @@ def test_an_interrupted_campaign_goes_on_where_it_was(models: Models, tmp_path: 
 
 
 def test_a_killed_campaign_ends_with_the_files_of_one_that_was_not(cli: Cli, tmp_path: Path) -> None:
-    command = (
-        "campaign",
-        "platoon",
-        "--scenario",
-        "manoeuvres",
-        "--samples",
-        "100",
-        "--runs",
-        "80",
-        "--attack",
-        "0.5",
-        "--loss",
-        "0,0.1",
-        "-q",
-        "--workers",
-        "2",
-        "--out",
-    )
+    command = ("campaign", "platoon", "--scenario", "manoeuvres", "--samples", "100", "--runs", "80", "--attack", "0.5", "--loss", "0,0.1", "-q", "--workers", "2", "--out")
     assert cli(*command, tmp_path / "once").status == 0
     folder = tmp_path / "killed" / "chunks"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "hullguard", *command, str(tmp_path / "killed")],
-        start_new_session=True,
-        stderr=subprocess.DEVNULL,
-    )
+    process = subprocess.Popen([sys.executable, "-m", "hullguard", *command, str(tmp_path / "killed")], start_new_session=True, stderr=subprocess.DEVNULL)
     try:
         deadline = time.monotonic() + 40.0
         while len(list(folder.glob("*.json"))) < 2:
@@ -325,31 +194,12 @@ def test_a_killed_campaign_ends_with_the_files_of_one_that_was_not(cli: Cli, tmp
     assert resumed.status == 0
     assert "runs were there already" in resumed.out
     once = files(tmp_path / "once")
-    assert set(once) == {
-        "campaign.json",
-        "results.parquet",
-        "campaign.html",
-        "false_alarms.png",
-    }
+    assert set(once) == {"campaign.json", "results.parquet", "campaign.html", "false_alarms.png"}
     assert files(tmp_path / "killed") == once
 
 
 def test_designs_of_a_grid_are_made_once(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    options = (
-        "campaign",
-        "platoon",
-        "--runs",
-        2,
-        "--samples",
-        40,
-        "--no-fault",
-        "--workers",
-        1,
-        "--vary",
-        "groups.measurement.trigger.silence=0,1",
-        "--out",
-        tmp_path,
-    )
+    options = ("campaign", "platoon", "--runs", 2, "--samples", 40, "--no-fault", "--workers", 1, "--vary", "groups.measurement.trigger.silence=0,1", "--out", tmp_path)
     first = cli(*options)
     assert "design 2 of 2: groups.measurement.trigger.silence = 1\n" in first.out
     monkeypatch.setattr("hullguard.commands.stored_for", None)
@@ -379,24 +229,7 @@ def address() -> Iterator[str]:
 def test_a_cluster_gives_the_same_results_from_a_model_that_only_the_caller_has(cli: Cli, tmp_path: Path, address: str) -> None:
     for name in ("platoon.toml", "platoon.design.toml"):
         (tmp_path / name).write_bytes((SHIPPED / name).read_bytes())
-    options = (
-        "campaign",
-        tmp_path / "platoon.toml",
-        "--scenario",
-        "manoeuvres",
-        "--samples",
-        80,
-        "--runs",
-        40,
-        "--attack",
-        0.3,
-        "--loss",
-        "0,0.1",
-        "--workers",
-        1,
-        "-q",
-        "--json",
-    )
+    options = ("campaign", tmp_path / "platoon.toml", "--scenario", "manoeuvres", "--samples", 80, "--runs", 40, "--attack", 0.3, "--loss", "0,0.1", "--workers", 1, "-q", "--json")
     here = cli(*options)
     there = cli(*options, "--scheduler", address)
     assert there.json == here.json
@@ -416,18 +249,7 @@ def test_a_worker_with_another_build_of_the_library_is_refused(models: Models) -
 
 def test_a_cluster_that_is_not_there_is_one_clear_line(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.3)
-    few = (
-        "campaign",
-        "platoon",
-        "--scenario",
-        "rest",
-        "--runs",
-        1,
-        "--samples",
-        20,
-        "-q",
-        "--scheduler",
-    )
+    few = ("campaign", "platoon", "--scenario", "rest", "--runs", 1, "--samples", 20, "-q", "--scheduler")
     silent = cli(*few, "tcp://127.0.0.1:9")
     assert (silent.status, len(silent.err.strip().splitlines())) == (2, 1), silent.err
     assert "no scheduler answers" in silent.err
@@ -441,17 +263,7 @@ def test_a_cluster_that_is_not_there_is_one_clear_line(cli: Cli, monkeypatch: py
 
 
 def test_tables_have_a_row_a_run_with_its_case(cli: Cli, tmp_path: Path) -> None:
-    options = (
-        *FEW,
-        "--runs",
-        5,
-        "--loss",
-        "0,0.2",
-        "--fault",
-        FAULT,
-        "--vary",
-        "groups.measurement.trigger.silence=0,[0, 1]",
-    )
+    options = (*FEW, "--runs", 5, "--loss", "0,0.2", "--fault", FAULT, "--vary", "groups.measurement.trigger.silence=0,[0, 1]")
     found = cli(*options, "--table", tmp_path / "t.parquet").json
     cli(*options, "--table", tmp_path / "t.csv")
     columns = pq.read_table(tmp_path / "t.parquet").to_pydict()
@@ -462,30 +274,14 @@ def test_tables_have_a_row_a_run_with_its_case(cli: Cli, tmp_path: Path) -> None
         case = found["cases"][row["case"]]
         assert all(columns[k][i] == v for k, v in row.items())
         assert all(float(lines[i][k]) == v for k, v in row.items())
-        assert (
-            columns["loss"][i],
-            columns["fault"][i],
-            float(lines[i]["loss"]),
-            lines[i]["fault"],
-        ) == (case["loss"], case["fault"]) * 2
+        assert (columns["loss"][i], columns["fault"][i], float(lines[i]["loss"]), lines[i]["fault"]) == (case["loss"], case["fault"]) * 2
         assert columns["groups.measurement.trigger.silence"][i] == str(case["groups.measurement.trigger.silence"])
         assert columns["delay"][i] == (None if row["provisional_at"] < 0 else row["provisional_at"] - 40)
     assert pq.read_schema(tmp_path / "t.parquet").field("margin").type == pa.float64()
 
 
 def test_without_pyarrow_parquet_is_refused_and_a_folder_gets_csv(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    few = (
-        "campaign",
-        "platoon",
-        "--scenario",
-        "rest",
-        "--runs",
-        2,
-        "--samples",
-        20,
-        "--workers",
-        1,
-    )
+    few = ("campaign", "platoon", "--scenario", "rest", "--runs", 2, "--samples", 20, "--workers", 1)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     refused = cli(*few, "--table", tmp_path / "t.parquet")
@@ -506,10 +302,7 @@ def test_the_bound_of_false_alarms_is_exact(hits: int, runs: int) -> None:
 
 
 def test_a_summary_is_that_of_its_rows(models: Models) -> None:
-    cases = [
-        case_of(models, faults=[FAULT], attack=0.25),
-        case_of(models, SILENT_1, [FAULT]),
-    ]
+    cases = [case_of(models, faults=[FAULT], attack=0.25), case_of(models, SILENT_1, [FAULT])]
     parts = list(zip(cases, campaign(cases, 40), strict=True))
     both = summary(parts)
     delays = np.concatenate([r["provisional_at"] for _, r in parts]) - 40
@@ -523,32 +316,10 @@ def test_a_summary_is_that_of_its_rows(models: Models) -> None:
 
 
 def test_a_report_shows_the_grid_and_is_drawn_again_to_the_byte(cli: Cli, tmp_path: Path) -> None:
-    options = (
-        "campaign",
-        "platoon",
-        "--scenario",
-        "manoeuvres",
-        "--samples",
-        80,
-        "--runs",
-        6,
-        "--attack",
-        0.5,
-        "--workers",
-        1,
-        "-q",
-        *GRID,
-    )
+    options = ("campaign", "platoon", "--scenario", "manoeuvres", "--samples", 80, "--runs", 6, "--attack", 0.5, "--workers", 1, "-q", *GRID)
     assert cli(*options, "--out", tmp_path).status == 0
     before = files(tmp_path)
-    assert set(before) == {
-        "campaign.json",
-        "results.parquet",
-        "campaign.html",
-        "delay_by_size.png",
-        "delay_by_bits.png",
-        "false_alarms.png",
-    }
+    assert set(before) == {"campaign.json", "results.parquet", "campaign.html", "delay_by_size.png", "delay_by_bits.png", "false_alarms.png"}
     text = before["campaign.html"].decode()
     assert text.count("<figure>") == 3
     assert "http" not in text.replace("http-equiv", "")
@@ -561,25 +332,7 @@ def test_a_report_shows_the_grid_and_is_drawn_again_to_the_byte(cli: Cli, tmp_pa
 
 
 def test_a_report_shows_the_limit_where_a_case_has_one(cli: Cli, tmp_path: Path) -> None:
-    options = (
-        "campaign",
-        "platoon",
-        "--scenario",
-        "rest",
-        "--samples",
-        80,
-        "--runs",
-        3,
-        "--workers",
-        1,
-        "-q",
-        "--fault",
-        FAULT,
-        "--size",
-        "1,2",
-        "--out",
-        tmp_path,
-    )
+    options = ("campaign", "platoon", "--scenario", "rest", "--samples", 80, "--runs", 3, "--workers", 1, "-q", "--fault", FAULT, "--size", "1,2", "--out", tmp_path)
     assert cli(*options).status == 0
     plain = files(tmp_path)
     result = json.loads(plain["campaign.json"])
@@ -593,22 +346,7 @@ def test_a_report_shows_the_limit_where_a_case_has_one(cli: Cli, tmp_path: Path)
 
 
 def test_rows_of_many_runs_are_in_the_table_only(cli: Cli, tmp_path: Path) -> None:
-    found = cli(
-        "campaign",
-        "platoon",
-        "--scenario",
-        "rest",
-        "--samples",
-        3,
-        "--runs",
-        2001,
-        "--workers",
-        1,
-        "-q",
-        "--json",
-        "--out",
-        tmp_path,
-    ).json
+    found = cli("campaign", "platoon", "--scenario", "rest", "--samples", 3, "--runs", 2001, "--workers", 1, "-q", "--json", "--out", tmp_path).json
     assert "rows" not in found
     assert pq.read_table(tmp_path / "results.parquet").num_rows == found["runs"] == 2001
 
@@ -637,10 +375,7 @@ def test_a_burst_takes_all_frames_of_its_group_and_then_ends(models: Models, bur
 
 def test_no_alarm_is_confirmed_whatever_burst_of_losses_comes(models: Models) -> None:
     for burst, overrides in itertools.product((2, 5, 12), (None, SILENT_1, ADAPTIVE)):
-        rows = campaign(
-            [case_of(models, overrides, loss=0.1, burst=burst, attack=0.1, samples=200)],
-            100,
-        )[0]
+        rows = campaign([case_of(models, overrides, loss=0.1, burst=burst, attack=0.1, samples=200)], 100)[0]
         assert rows["lost"].sum() > 0
         assert not rows["false_confirmed"].any(), (burst, overrides)
 
@@ -659,18 +394,7 @@ def test_samples_of_the_silent_phase_are_counted(models: Models, silence: int) -
 def attack_on(ready: Ready, last: int = 149, **options: Any) -> tuple[Attack, np.ndarray, np.ndarray]:
     plant = ready.design.model.plant
     d, x = np.zeros((150, plant.Ed.shape[1])), np.zeros(plant.n)
-    return (
-        Attack(
-            ready.batch(150, disturbance=d, initial=x, **options),
-            ready.design,
-            d,
-            x,
-            SEED,
-            last,
-        ),
-        d,
-        x,
-    )
+    return Attack(ready.batch(150, disturbance=d, initial=x, **options), ready.design, d, x, SEED, last), d, x
 
 
 @pytest.mark.parametrize("overrides", [None, SILENT_1, ADAPTIVE], ids=["always", "silent", "adaptive"])
@@ -678,10 +402,7 @@ def attack_on(ready: Ready, last: int = 149, **options: Any) -> tuple[Attack, np
 def test_attacked_runs_come_closer_to_the_threshold_than_random_ones_and_never_pass_it(models: Models, overrides: dict[str, Any] | None, real: str) -> None:
     case = case_of(models, overrides, real=real, attack=0.25, samples=150)
     rows = campaign([case], 160)[0]
-    hard, easy = (
-        rows["margin_settled"][rows["attacked"] == 1],
-        rows["margin_settled"][rows["attacked"] == 0],
-    )
+    hard, easy = rows["margin_settled"][rows["attacked"] == 1], rows["margin_settled"][rows["attacked"] == 0]
     assert (len(hard), len(easy)) == (40, 120)
     assert hard.mean() > 1.5 * easy.mean()
     assert hard.max() > easy.max() + 0.1
@@ -706,28 +427,17 @@ def test_an_attack_aims_before_the_fault(models: Models) -> None:
     made, d, _ = attack_on(models.platoon("rest"), last=9)
     for number in range(10):
         rng = np.random.default_rng([SEED, number, attack.STREAM])
-        drawn = (
-            int(rng.integers(2)),
-            int(rng.integers(10)),
-            float(rng.choice([-1.0, 1.0])),
-        )
+        drawn = int(rng.integers(2)), int(rng.integers(10)), float(rng.choice([-1.0, 1.0]))
         assert drawn[1] <= 9
         random = rng.choice([-1.0, 1.0], d.shape)
         made.run(number)
         assert np.array_equal(d[10:], random[10:]), "behind the last sample nothing is chosen"
 
 
-def test_residuals_are_the_functionals_that_an_attack_takes_them_for(
-    models: Models,
-) -> None:
+def test_residuals_are_the_functionals_that_an_attack_takes_them_for(models: Models) -> None:
     for name, scenario in (("platoon", "manoeuvres"), ("openacc", "default")):
         made = models.design(None, scenario, name)
-        ready = Ready(
-            made,
-            models.platoon().native.__class__(library("f64"), made.tables),
-            made.model.scenario(scenario).reference,
-            150,
-        )
+        ready = Ready(made, models.platoon().native.__class__(library("f64"), made.tables), made.model.scenario(scenario).reference, 150)
         trace = ready.batch(150).trace(0)
         weights = attack.functionals(made.tables, 120)
         for k in (125, 149):
@@ -735,20 +445,12 @@ def test_residuals_are_the_functionals_that_an_attack_takes_them_for(
             assert np.abs(r - trace["r"][k]).max() <= 1e-6 * max(1.0, np.abs(trace["r"]).max()), name
 
 
-def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_them_to(
-    models: Models,
-) -> None:
+def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_them_to(models: Models) -> None:
     ready = models.platoon("manoeuvres", real="f64")
     rng = np.random.default_rng([SEED, 3])
-    plant, quantum = (
-        ready.design.model.plant,
-        max(s.resolution for s in ready.design.model.signals),
-    )
+    plant, quantum = ready.design.model.plant, max(s.resolution for s in ready.design.model.signals)
     moves = attack.sensitivity(ready.design.model, 30)
-    d, x = (
-        rng.uniform(-1.0, 1.0, (2, 31, plant.Ed.shape[1])),
-        rng.uniform(-1.0, 1.0, (2, plant.n)) * plant.initial_range,
-    )
+    d, x = rng.uniform(-1.0, 1.0, (2, 31, plant.Ed.shape[1])), rng.uniform(-1.0, 1.0, (2, plant.n)) * plant.initial_range
     before, after = (ready.batch(31, disturbance=d[i], initial=x[i]).trace(0)["reading"] for i in (0, 1))
     predicted = moves @ np.concatenate([(d[1] - d[0]).ravel(), x[1] - x[0]])
     # The plant applies what the wire carries: each sample's inputs are rounded, and the loop carries that on.
@@ -762,37 +464,22 @@ def test_a_pattern_that_no_disturbance_fits_ends_the_attack(models: Models, monk
 
     def impossible(*arguments: Any) -> tuple[Any, Any, Any]:
         rows, low, high = plain(*arguments)
-        return (
-            np.vstack([rows, np.zeros(rows.shape[1])]),
-            np.append(low, 1.0),
-            np.append(high, 2.0),
-        )
+        return np.vstack([rows, np.zeros(rows.shape[1])]), np.append(low, 1.0), np.append(high, 2.0)
 
     monkeypatch.setattr(made, "_promises", impossible)
     assert made.run(1)["margin"] > 0.0
 
 
 def test_attacked_runs_are_an_exact_share_spread_evenly(models: Models) -> None:
-    for share, expected in (
-        (0.1, 100),
-        (0.25, 250),
-        (1.0, 1000),
-        (0.0, 0),
-        (0.333, 333),
-    ):
+    for share, expected in ((0.1, 100), (0.25, 250), (1.0, 1000), (0.0, 0), (0.333, 333)):
         case = case_of(models, attack=share)
         hits = [r for r in range(1000) if case.attacked(r)]
         assert len(hits) == expected
         assert not hits or max(np.diff([-1, *hits])) <= int(1 / share) + 1
 
 
-def test_a_chunk_of_an_attacked_case_leaves_the_other_runs_as_they_are(
-    models: Models,
-) -> None:
-    plain, hard = (
-        chunk(case_of(models), 3, 8),
-        chunk(case_of(models, attack=0.25), 3, 8),
-    )
+def test_a_chunk_of_an_attacked_case_leaves_the_other_runs_as_they_are(models: Models) -> None:
+    plain, hard = chunk(case_of(models), 3, 8), chunk(case_of(models, attack=0.25), 3, 8)
     for n in range(8):
         equal = all(plain[name][n] == hard[name][n] for name in COLUMNS if name != "attacked")
         assert equal == (hard["attacked"][n] == 0), n

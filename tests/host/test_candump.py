@@ -38,11 +38,7 @@ FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 def frames(draw: st.DrawFn, kinds: tuple[str, ...] = ("classic", "remote", "fd", "error")) -> Frame:
     kind = draw(st.sampled_from(kinds))
     if kind == "error":
-        return Frame(
-            draw(st.integers(0, 0x1FFFFFFF)),
-            ERROR,
-            draw(st.binary(min_size=8, max_size=8)),
-        )
+        return Frame(draw(st.integers(0, 0x1FFFFFFF)), ERROR, draw(st.binary(min_size=8, max_size=8)))
     extended = draw(st.booleans())
     number = draw(st.integers(0, 0x1FFFFFFF if extended else 0x7FF))
     flags = EXTENDED if extended else 0
@@ -50,18 +46,11 @@ def frames(draw: st.DrawFn, kinds: tuple[str, ...] = ("classic", "remote", "fd",
         return Frame(number, flags | REMOTE, b"")
     if kind == "fd":
         length = draw(st.sampled_from(FD_LENGTHS))
-        return Frame(
-            number,
-            flags | FD | (BRS if draw(st.booleans()) else 0),
-            draw(st.binary(min_size=length, max_size=length)),
-        )
+        return Frame(number, flags | FD | (BRS if draw(st.booleans()) else 0), draw(st.binary(min_size=length, max_size=length)))
     return Frame(number, flags, draw(st.binary(max_size=8)))
 
 
-logs = st.lists(
-    st.tuples(st.integers(0, 2_000_000_000_000_000).map(lambda us: us / 1e6), frames()),
-    max_size=20,
-)
+logs = st.lists(st.tuples(st.integers(0, 2_000_000_000_000_000).map(lambda us: us / 1e6), frames()), max_size=20)
 
 
 def written(path: Path, entries: list[tuple[float, Frame]]) -> Path:
@@ -138,24 +127,12 @@ def test_lines_are_those_of_candump() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (
-            "(1436509052.249713) vcan0 044#2A366C2BBA",
-            Frame(0x044, 0, bytes.fromhex("2A366C2BBA")),
-        ),
-        (
-            "(1436509053.850870) can0 12345678#AABB R",
-            Frame(0x12345678, EXTENDED, bytes.fromhex("AABB")),
-        ),
-        (
-            "(1436509053.850870) can0 12345678#aabb T",
-            Frame(0x12345678, EXTENDED, bytes.fromhex("AABB")),
-        ),
+        ("(1436509052.249713) vcan0 044#2A366C2BBA", Frame(0x044, 0, bytes.fromhex("2A366C2BBA"))),
+        ("(1436509053.850870) can0 12345678#AABB R", Frame(0x12345678, EXTENDED, bytes.fromhex("AABB"))),
+        ("(1436509053.850870) can0 12345678#aabb T", Frame(0x12345678, EXTENDED, bytes.fromhex("AABB"))),
         ("(1436509053.85) can0 123#R8", Frame(0x123, REMOTE, b"")),
         ("(1436509053.850870) can0 123##0", Frame(0x123, FD, b"")),
-        (
-            "(1436509053.850870) can0 123##5AABB",
-            Frame(0x123, FD | BRS, bytes.fromhex("AABB")),
-        ),
+        ("(1436509053.850870) can0 123##5AABB", Frame(0x123, FD | BRS, bytes.fromhex("AABB"))),
     ],
 )
 def test_lines_as_other_tools_write_them_are_understood(tmp_path: Path, text: str, expected: Frame) -> None:
@@ -170,13 +147,7 @@ def test_lines_as_other_tools_write_them_are_understood(tmp_path: Path, text: st
 @example("#")
 @given(st.text(max_size=40))
 def test_no_line_does_anything_but_become_a_frame_or_be_refused(text: str) -> None:
-    for raw in (
-        text,
-        "(1.0) can0 " + text,
-        "(1.0) can0 123#" + text,
-        "(1.0) can0 123##" + text,
-        "(1.0) can0 12345678#R" + text,
-    ):
+    for raw in (text, "(1.0) can0 " + text, "(1.0) can0 123#" + text, "(1.0) can0 123##" + text, "(1.0) can0 12345678#R" + text):
         try:
             candump._entry(raw, "x.log:1")
         except InputError as error:
@@ -195,9 +166,7 @@ def test_no_frame_longer_than_its_format_is_taken_from_a_log(tmp_path: Path, mar
 
 
 @given(frames(("classic", "remote")))
-def test_no_classic_frame_has_another_length_than_the_bit_by_bit_encoder_says(
-    frame: Frame,
-) -> None:
+def test_no_classic_frame_has_another_length_than_the_bit_by_bit_encoder_says(frame: Frame) -> None:
     assert frame_bits(library("f32"), frame) == classic_bits(frame)
 
 
@@ -211,9 +180,7 @@ def test_frames_full_of_stuff_bits_have_the_length_of_the_encoder(fill: int, num
 
 
 @given(frames(("classic", "fd")))
-def test_no_frame_is_longer_than_its_worst_case_or_shorter_than_without_stuffing(
-    frame: Frame,
-) -> None:
+def test_no_frame_is_longer_than_its_worst_case_or_shorter_than_without_stuffing(frame: Frame) -> None:
     n, extended = len(frame.data), bool(frame.flags & EXTENDED)
     bits = frame_bits(library("f32"), frame)
     flags = frame.flags & (EXTENDED | FD | BRS)
@@ -233,11 +200,5 @@ def test_the_worst_case_is_reached_but_for_a_few_bits() -> None:
     assert longest <= 135
     rng = random.Random(SEED)
     patterns = [0x07, 0x0F, 0x1E, 0x3C, 0x78, 0xF0, 0xE1, 0xC3, 0x87, 0x83]
-    best = max(
-        frame_bits(
-            library("f32"),
-            Frame(0x078, 0, bytes(rng.choice(patterns) for _ in range(8))),
-        )
-        for _ in range(3000)
-    )
+    best = max(frame_bits(library("f32"), Frame(0x078, 0, bytes(rng.choice(patterns) for _ in range(8)))) for _ in range(3000))
     assert best >= 123

@@ -33,25 +33,8 @@ from hullguard.model.schema import load_model
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = ROOT / "firmware" / "models"
 SOURCES = sorted((ROOT / "firmware" / "src").glob("*.c"))
-WARNINGS = [
-    "-std=c11",
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wsign-conversion",
-    "-Wdouble-promotion",
-    "-Wfloat-equal",
-]
-WARNINGS += [
-    "-Wstrict-prototypes",
-    "-Wmissing-prototypes",
-    "-Wshadow",
-    "-Wcast-align",
-    "-Wvla",
-    "-Wundef",
-    "-Wswitch-enum",
-]
+WARNINGS = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wfloat-equal"]
+WARNINGS += ["-Wstrict-prototypes", "-Wmissing-prototypes", "-Wshadow", "-Wcast-align", "-Wvla", "-Wundef", "-Wswitch-enum"]
 WARNINGS += ["-ffp-contract=off", "-Werror"]
 COMPILERS = [c for c in ("gcc", "clang-19") if shutil.which(c)]
 REALS = ("f32", "f64")
@@ -321,26 +304,8 @@ def changed_places(d: Design) -> Design:
     a, b, c = first.signals
     signals = (
         replace(a, start=23, length=17, flags=MOTOROLA | SIGNED),
-        replace(
-            b,
-            start=38,
-            length=15,
-            flags=MOTOROLA,
-            offset=-16.0,
-            minimum=0,
-            maximum=32000,
-            zero=16000,
-        ),
-        replace(
-            c,
-            start=48,
-            length=16,
-            flags=0,
-            offset=-20.0,
-            minimum=0,
-            maximum=40000,
-            zero=20000,
-        ),
+        replace(b, start=38, length=15, flags=MOTOROLA, offset=-16.0, minimum=0, maximum=32000, zero=16000),
+        replace(c, start=48, length=16, flags=0, offset=-20.0, minimum=0, maximum=40000, zero=20000),
     )
     return replace(d, tables=replace(d.tables, groups=(replace(first, signals=signals), *rest)))
 
@@ -351,11 +316,7 @@ def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
     path = tmp_path_factory.mktemp("models") / "tank.toml"
     path.write_text(TANK, encoding="utf-8")
     platoon = design(load_model("platoon"))[0]
-    return {
-        "platoon": platoon,
-        "tank": design(load_model(str(path)))[0],
-        "places": changed_places(platoon),
-    }
+    return {"platoon": platoon, "tank": design(load_model(str(path)))[0], "places": changed_places(platoon)}
 
 
 NAMES = ("platoon", "tank", "places")
@@ -371,29 +332,15 @@ class Built:
 
     def run(self, program: str, *arguments: str, given: str = "") -> list[str]:
         """Lines that a program prints."""
-        done = subprocess.run(
-            [self.dir / program, *arguments],
-            input=given,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=60,
-        )
+        done = subprocess.run([self.dir / program, *arguments], input=given, capture_output=True, text=True, check=True, timeout=60)
         return done.stdout.splitlines()
 
 
 def definitions(name: str) -> list[str]:
     """How a probe is told the model's names."""
-    parts = {
-        "MODEL_HEADER": f'"{name}.h"',
-        "CONFIG": f"hg_{name}_config",
-        "SENDER": f"hg_{name}_sender",
-    }
+    parts = {"MODEL_HEADER": f'"{name}.h"', "CONFIG": f"hg_{name}_config", "SENDER": f"hg_{name}_sender"}
     parts |= {"NODE": f"hg_{name}_node", "SENDERS": f"hg_{name}_senders"}
-    parts |= {
-        "START_NODE": f"hg_{name}_node_start",
-        "START_SENDERS": f"hg_{name}_senders_start",
-    }
+    parts |= {"START_NODE": f"hg_{name}_node_start", "START_SENDERS": f"hg_{name}_senders_start"}
     return [f"-D{key}={value}" for key, value in parts.items()]
 
 
@@ -403,28 +350,14 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Path]]:
     made: dict[str, list[Path]] = {}
     for r in REALS:
         out = tmp_path_factory.mktemp(f"library_{r}")
-        command = [
-            "gcc",
-            *WARNINGS,
-            "-O1",
-            "-fsanitize=undefined",
-            "-fno-sanitize-recover=all",
-            f"-DHG_REAL_{r.upper()}=1",
-            f"-I{ROOT}/firmware/include",
-            "-c",
-        ]
+        command = ["gcc", *WARNINGS, "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", f"-DHG_REAL_{r.upper()}=1", f"-I{ROOT}/firmware/include", "-c"]
         subprocess.run([*command, *map(str, SOURCES)], cwd=out, check=True)
         made[r] = sorted(out.glob("*.o"))
     return made
 
 
 @pytest.fixture(scope="module", params=NAMES)
-def built(
-    request: pytest.FixtureRequest,
-    designs: dict[str, Design],
-    objects: dict[str, list[Path]],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Built:
+def built(request: pytest.FixtureRequest, designs: dict[str, Design], objects: dict[str, list[Path]], tmp_path_factory: pytest.TempPathFactory) -> Built:
     """A model's generated files, compiled and linked with the library under every warning."""
     d, name = designs[request.param], designs[request.param].tables.name
     out = tmp_path_factory.mktemp(request.param)
@@ -432,22 +365,8 @@ def built(
     for program, text in (("probe", PROBE), ("report", REPORT)):
         (out / f"{program}.c").write_text(text, encoding="ascii")
         for r in REALS:
-            command = [
-                "gcc",
-                *WARNINGS,
-                "-O1",
-                "-fsanitize=undefined",
-                "-fno-sanitize-recover=all",
-                f"-DHG_REAL_{r.upper()}=1",
-                *definitions(name),
-            ]
-            command += [
-                f"-I{ROOT}/firmware/include",
-                f"-I{out}",
-                str(out / f"{program}.c"),
-                str(out / f"{name}.c"),
-                *map(str, objects[r]),
-            ]
+            command = ["gcc", *WARNINGS, "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", f"-DHG_REAL_{r.upper()}=1", *definitions(name)]
+            command += [f"-I{ROOT}/firmware/include", f"-I{out}", str(out / f"{program}.c"), str(out / f"{name}.c"), *map(str, objects[r])]
             subprocess.run([*command, "-o", str(out / f"{program}_{r}")], check=True)
     database = cantools.database.load_string((out / f"{name}.dbc").read_text(encoding="ascii"), "dbc", strict=True)
     assert isinstance(database, Database)
@@ -477,9 +396,7 @@ def test_text_is_plain_and_says_where_it_comes_from(designs: dict[str, Design], 
         assert not re.search(r"[ \t]$", text, re.MULTILINE)
 
 
-def test_shipped_files_are_those_of_the_shipped_model(
-    designs: dict[str, Design],
-) -> None:
+def test_shipped_files_are_those_of_the_shipped_model(designs: dict[str, Design]) -> None:
     header, source = emit_c(designs["platoon"])
     assert (MODELS / "platoon.h").read_text(encoding="ascii") == header
     assert (MODELS / "platoon.c").read_text(encoding="ascii") == source
@@ -497,15 +414,7 @@ def test_files_are_written_only_when_they_change(designs: dict[str, Design], tmp
 
 
 def test_literals_are_exact() -> None:
-    for x in (
-        0.0,
-        -0.0,
-        1.0,
-        -1.5,
-        float(np.float32(0.1)),
-        float(np.float32(1e-45)),
-        float(np.finfo(np.float32).max),
-    ):
+    for x in (0.0, -0.0, 1.0, -1.5, float(np.float32(0.1)), float(np.float32(1e-45)), float(np.finfo(np.float32).max)):
         literal = real(x)
         inner = literal.removeprefix("HG_REAL_C(").removesuffix(")")
         assert float.fromhex(inner).hex() == x.hex()
@@ -521,13 +430,7 @@ def test_long_rows_are_spread_evenly() -> None:
     assert sum(line.count("HG_REAL_C") for line in lines) == 13
 
 
-@pytest.mark.parametrize(
-    ("group", "message"),
-    [
-        ("Status", "the detector's own frame"),
-        ("Measure-ment", "'Measure-ment' have the same identifier"),
-    ],
-)
+@pytest.mark.parametrize(("group", "message"), [("Status", "the detector's own frame"), ("Measure-ment", "'Measure-ment' have the same identifier")])
 def test_names_that_would_collide_are_refused(designs: dict[str, Design], group: str, message: str) -> None:
     d = designs["platoon"]
     first, second = d.tables.groups
@@ -542,12 +445,7 @@ def test_a_signal_named_like_a_constant_is_refused(designs: dict[str, Design]) -
     first, second = d.tables.groups
     signals = (replace(first.signals[0], name="group_control"), *first.signals[1:])
     with pytest.raises(InputError, match="HG_PLATOON_GROUP_CONTROL"):
-        emit_c(
-            replace(
-                d,
-                tables=replace(d.tables, groups=(replace(first, signals=signals), second)),
-            )
-        )
+        emit_c(replace(d, tables=replace(d.tables, groups=(replace(first, signals=signals), second))))
 
 
 # --- C ---------------------------------------------------------------------------------------------------------------------------------
@@ -560,64 +458,22 @@ def test_compiles_without_a_warning(designs: dict[str, Design], tmp_path: Path, 
     d = designs[name]
     write_all(d, tmp_path)
     model = d.tables.name
-    command = [
-        compiler,
-        *WARNINGS,
-        f"-DHG_REAL_{number.upper()}=1",
-        f"-I{ROOT}/firmware/include",
-    ]
-    subprocess.run(
-        [*command, "-c", str(tmp_path / f"{model}.c"), "-o", str(tmp_path / "out.o")],
-        check=True,
-    )
+    command = [compiler, *WARNINGS, f"-DHG_REAL_{number.upper()}=1", f"-I{ROOT}/firmware/include"]
+    subprocess.run([*command, "-c", str(tmp_path / f"{model}.c"), "-o", str(tmp_path / "out.o")], check=True)
 
 
 def test_header_is_cpp_too(designs: dict[str, Design], tmp_path: Path) -> None:
     write_all(designs["tank"], tmp_path)
-    (tmp_path / "use.cpp").write_text(
-        '#include "tank.h"\n#include "tank.h"\nhg_tank_node node;\nhg_tank_senders senders;\n',
-        encoding="ascii",
-    )
-    subprocess.run(
-        [
-            "g++",
-            "-std=c++17",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            f"-I{ROOT}/firmware/include",
-            "-fsyntax-only",
-            str(tmp_path / "use.cpp"),
-        ],
-        check=True,
-    )
+    (tmp_path / "use.cpp").write_text('#include "tank.h"\n#include "tank.h"\nhg_tank_node node;\nhg_tank_senders senders;\n', encoding="ascii")
+    subprocess.run(["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{ROOT}/firmware/include", "-fsyntax-only", str(tmp_path / "use.cpp")], check=True)
 
 
-@pytest.mark.parametrize(
-    ("limit", "least"),
-    [
-        ("HG_GROUPS_MAX", 3),
-        ("HG_GROUP_SIGNALS_MAX", 3),
-        ("HG_LEVELS_MAX", 3),
-        ("HG_GENERATORS_MAX", 2),
-    ],
-)
+@pytest.mark.parametrize(("limit", "least"), [("HG_GROUPS_MAX", 3), ("HG_GROUP_SIGNALS_MAX", 3), ("HG_LEVELS_MAX", 3), ("HG_GENERATORS_MAX", 2)])
 def test_too_small_a_limit_is_an_error_that_names_it(designs: dict[str, Design], tmp_path: Path, limit: str, least: int) -> None:
     write_all(designs["tank"], tmp_path)
-    command = [
-        "gcc",
-        "-std=c11",
-        f"-I{ROOT}/firmware/include",
-        "-fsyntax-only",
-        str(tmp_path / "tank.c"),
-    ]
+    command = ["gcc", "-std=c11", f"-I{ROOT}/firmware/include", "-fsyntax-only", str(tmp_path / "tank.c")]
     subprocess.run([*command, f"-D{limit}={least}U"], check=True)
-    failed = subprocess.run(
-        [*command, f"-D{limit}={least - 1}U"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    failed = subprocess.run([*command, f"-D{limit}={least - 1}U"], capture_output=True, text=True, check=False)
     assert failed.returncode != 0
     assert f"model tank needs {limit} of at least {least}" in failed.stderr
 
@@ -644,19 +500,7 @@ def _message(m: MessageTable, signals: tuple[SignalTable, ...]) -> Numbers:
 
 def _group(g: GroupTable) -> Numbers:
     numbers = _message(g.message, g.signals) + _each("sender", 1)
-    numbers += [
-        p
-        for key in (
-            "levels",
-            "interval_max",
-            "margin",
-            "silence",
-            "delta",
-            "sigma",
-            "activity",
-        )
-        for p in _each(key, getattr(g, key))
-    ]
+    numbers += [p for key in ("levels", "interval_max", "margin", "silence", "delta", "sigma", "activity") for p in _each(key, getattr(g, key))]
     numbers += _each("zero", tuple(s.zero for s in g.signals)) + _each("half", tuple(s.half for s in g.signals)) + _each("slew", g.slew)
     return numbers + _each("span", tuple(s.span for s in g.signals)) + _each("middle", tuple(s.middle for s in g.signals))
 
@@ -674,18 +518,7 @@ def expected_numbers(d: Design) -> Numbers:
             m = getattr(e, key)
             numbers += _each("rows", len(m)) + _each("cols", len(m[0])) + _each("exponent", 0) + _each(key, m)
         numbers += _each("same", 1)
-        for key in (
-            "taps",
-            "weight",
-            "settle",
-            "rest",
-            "moving",
-            "ready_rest",
-            "ready_moving",
-            "decay",
-            "tail_input",
-            "tail_output",
-        ):
+        for key in ("taps", "weight", "settle", "rest", "moving", "ready_rest", "ready_moving", "decay", "tail_input", "tail_output"):
             numbers += _each(key, getattr(e, key))
     numbers += _each("decisions", len(t.generators))
     numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each("faults", tuple(e.faults for e in t.generators))
@@ -735,19 +568,11 @@ def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
         data, message = bytes.fromhex(words[0]), _by_id(built.database, g)
         assert [int(w) for w in words[1 : 1 + len(codes)]] == codes
         signals = {s.name: _sent_value(s, code) for s, code in zip(g.signals, codes, strict=True)}
-        header: dict[str, float] = {
-            "E2E_CRC": data[0],
-            "E2E_counter": counter,
-            "E2E_stamp": stamp,
-        }
+        header: dict[str, float] = {"E2E_CRC": data[0], "E2E_counter": counter, "E2E_stamp": stamp}
         assert message.encode({**header, **signals}, padding=False, strict=True) == data
         read = message.decode(data)
         assert isinstance(read, dict)
-        assert (read["E2E_CRC"], read["E2E_counter"], read["E2E_stamp"]) == (
-            data[0],
-            counter,
-            stamp,
-        )
+        assert (read["E2E_CRC"], read["E2E_counter"], read["E2E_stamp"]) == (data[0], counter, stamp)
         raw = message.decode(data, scaling=False)
         assert isinstance(raw, dict)
         for s, code, value in zip(g.signals, codes, words[1 + len(codes) :], strict=True):
@@ -777,10 +602,7 @@ def test_dbc_says_how_frames_are_sent(built: Built) -> None:
         m = _by_id(built.database, g)
         assert m.dbc is not None
         assert (m.frame_id, m.length) == (g.message.id, g.message.length)
-        assert (m.is_extended_frame, m.is_fd) == (
-            bool(g.message.flags & EXTENDED),
-            bool(g.message.flags & FD),
-        )
+        assert (m.is_extended_frame, m.is_fd) == (bool(g.message.flags & EXTENDED), bool(g.message.flags & FD))
         assert m.send_type == ("Event" if g.interval_max > 1 else "Cyclic")
         assert m.cycle_time == round(g.interval_max * sample_ms)
         assert m.senders == [f"{m.name}_sender"]
@@ -793,31 +615,20 @@ def test_dbc_says_how_frames_are_sent(built: Built) -> None:
             found = m.get_signal_by_name(s.name)
             assert found.conversion.is_float == bool(s.flags & FLOAT32)
             assert found.byte_order == ("big_endian" if s.flags & MOTOROLA else "little_endian")
-            assert (found.start, found.length, found.unit) == (
-                s.start,
-                s.length,
-                UNITS[s.name.rsplit("_", 1)[1]],
-            )
+            assert (found.start, found.length, found.unit) == (s.start, s.length, UNITS[s.name.rsplit("_", 1)[1]])
             assert found.minimum == pytest.approx(s.offset + s.minimum * s.resolution, rel=1e-6)
             assert found.maximum == pytest.approx(s.offset + s.maximum * s.resolution, rel=1e-6)
             if not s.flags & FLOAT32:
                 assert found.is_signed == bool(s.flags & SIGNED)
                 assert np.float32(found.scale) == s.resolution and np.float32(found.offset) == s.offset
     nodes = {n.name for n in built.database.nodes}
-    assert nodes == {
-        "detector",
-        *(_by_id(built.database, g).senders[0] for g in tables.groups),
-    }
+    assert nodes == {"detector", *(_by_id(built.database, g).senders[0] for g in tables.groups)}
 
 
 def test_verdict_and_status_read_as_the_node_wrote_them(built: Built) -> None:
     database, tables = built.database, built.design.tables
     lines = [line.split() for line in built.run("report_f32")]
-    assert [int(i) for _, i in lines] == [
-        tables.verdict.id,
-        tables.status.id,
-        tables.verdict.id,
-    ]
+    assert [int(i) for _, i in lines] == [tables.verdict.id, tables.status.id, tables.verdict.id]
     first, status, reply = (database.decode_message(int(i), bytes.fromhex(data)) for data, i in lines)
     assert isinstance(first, dict) and isinstance(status, dict) and isinstance(reply, dict)
     verdict = database.get_message_by_frame_id(tables.verdict.id)

@@ -58,9 +58,7 @@ def delay(models: Models, overrides: dict[str, Any]) -> float:
     return float(np.mean([r["provisional_at"] - 100 for r in rows]))
 
 
-def test_prediction_is_worth_having_where_the_sender_may_be_silent(
-    models: Models,
-) -> None:
+def test_prediction_is_worth_having_where_the_sender_may_be_silent(models: Models) -> None:
     assert delay(models, SILENT_2 | PREDICTED) <= 0.7 * delay(models, SILENT_2)
     assert delay(models, PREDICTED) <= delay(models, {})
 
@@ -87,33 +85,13 @@ def test_predictions_of_random_plants_are_true_and_raise_no_alarm() -> None:
             options: dict[str, Any] = {}
             if how == "corners":
                 plant = found.model.plant
-                options = {
-                    "disturbance": rng.choice([-1.0, 1.0], (150, plant.Ed.shape[1])),
-                    "initial": plant.initial_range * rng.choice([-1.0, 1.0], plant.n),
-                }
-            batch = Batch(
-                native,
-                found,
-                150,
-                Reference(reference, 1.0, 20),
-                (),
-                SEED + number,
-                **options,
-            )
+                options = {"disturbance": rng.choice([-1.0, 1.0], (150, plant.Ed.shape[1])), "initial": plant.initial_range * rng.choice([-1.0, 1.0], plant.n)}
+            batch = Batch(native, found, 150, Reference(reference, 1.0, 20), (), SEED + number, **options)
             trace = batch.trace(0)
             twins_hold(trace, places, found.tables.signals)
             tighter += int(np.sum(trace["radius"][:, found.tables.signals :] < trace["radius"][:, places]))
             assert alarms(batch.runs(0, 10)) == Alarms(0, 0), f"plant {number}"
-        lossy = Batch(
-            native,
-            found,
-            150,
-            Reference("mixed", 1.0, 20),
-            (),
-            SEED + number,
-            loss=0.3,
-            start=MOVING,
-        ).runs(0, 20)
+        lossy = Batch(native, found, 150, Reference("mixed", 1.0, 20), (), SEED + number, loss=0.3, start=MOVING).runs(0, 20)
         assert alarms(lossy).confirmed == 0, f"plant {number}"
     assert tighter > 0
 
@@ -132,9 +110,6 @@ def test_a_prediction_that_does_not_wait_is_wrong(models: Models, tmp_path: Any)
 
 
 def test_a_plant_whose_hidden_part_does_not_forget_is_refused() -> None:
-    model = load_model(
-        "platoon",
-        PREDICTED | {"plant.drag_per_s": 0.0, "plant.feedback.state_weights": [1, 10, 1, 10, 1]},
-    )
+    model = load_model("platoon", PREDICTED | {"plant.drag_per_s": 0.0, "plant.feedback.state_weights": [1, 10, 1, 10, 1]})
     with pytest.raises(InputError, match=r"detector\.prediction.*not stable.*remove it"):
         design(model, fresh=True)

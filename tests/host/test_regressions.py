@@ -31,49 +31,17 @@ SCALAR: dict[str, Any] = {
     "name": "scalar",
     "kind": "linear",
     "sample_time_s": 0.1,
-    "plant": {
-        "A": [[0.9]],
-        "B": [[0.1]],
-        "C": [[1.0]],
-        "discrete": True,
-        "initial_range": [0.5],
-        "disturbance": {"state": 0.02, "output": 0.01},
-    },
+    "plant": {"A": [[0.9]], "B": [[0.1]], "C": [[1.0]], "discrete": True, "initial_range": [0.5], "disturbance": {"state": 0.02, "output": 0.01}},
     "signals": [
-        {
-            "name": "y",
-            "role": "output",
-            "range": [-60.0, 60.0],
-            "resolution": 0.001,
-            "slew": "reachable",
-        },
+        {"name": "y", "role": "output", "range": [-60.0, 60.0], "resolution": 0.001, "slew": "reachable"},
         {"name": "u", "role": "input", "range": [-60.0, 60.0], "resolution": 0.001},
     ],
     "groups": [
-        {
-            "name": "sensor",
-            "signals": ["y"],
-            "frame": {"id": 0x110},
-            "trigger": {"delta": 0.0, "sigma": [0.05], "silence": 2, "interval_max": 5},
-        },
-        {
-            "name": "control",
-            "signals": ["u"],
-            "frame": {"id": 0x120},
-            "transmission": "tick",
-            "applied_as_sent": True,
-        },
+        {"name": "sensor", "signals": ["y"], "frame": {"id": 0x110}, "trigger": {"delta": 0.0, "sigma": [0.05], "silence": 2, "interval_max": 5}},
+        {"name": "control", "signals": ["u"], "frame": {"id": 0x120}, "transmission": "tick", "applied_as_sent": True},
     ],
     "verdict": {"frame": {"id": 0x130}},
-    "detector": {
-        "observers": [
-            {
-                "order": 1,
-                "residuals": 1,
-                "search": {"trials": 30, "seed": 1, "poles": [0.2, 0.8]},
-            }
-        ]
-    },
+    "detector": {"observers": [{"order": 1, "residuals": 1, "search": {"trials": 30, "seed": 1, "poles": [0.2, 0.8]}}]},
     "faults": [{"name": "actuator", "signal": "u", "type": "actuator"}],
 }
 LOOP = {"gain": [[0.5]], "reference_bound": 1.0}
@@ -104,12 +72,7 @@ def test_a_plant_away_from_zero_is_held_there_and_quiet() -> None:
     """The emulator once drove it to zero, against slews computed around the equilibrium."""
     shifted = made(scalar({"equilibrium": [10.0], "feedback": LOOP}))
     assert shifted.model.plant.equilibrium_input == pytest.approx([10.0])
-    rows = Batch(
-        Native(library("f32"), shifted.tables),
-        shifted,
-        150,
-        Reference("mixed", 1.0, 20),
-    ).runs(0, 200)
+    rows = Batch(Native(library("f32"), shifted.tables), shifted, 150, Reference("mixed", 1.0, 20)).runs(0, 200)
     assert sum(r["false_provisional"] for r in rows) == 0
     assert max(r["margin"] for r in rows) <= 1.0
 
@@ -124,22 +87,12 @@ def test_a_range_is_compared_with_the_reach_around_its_own_middle() -> None:
     """A range that is not symmetric about zero was once compared by magnitudes."""
     with pytest.raises(InputError, match="reach of y beyond its range"):
         made(scalar({"feedback": LOOP}, [{"range": [10.0, 60.0]}]))
-    made(
-        scalar(
-            {"equilibrium": [45.0], "feedback": LOOP},
-            [{"range": [-1.0, 90.0]}, {"range": [-1.0, 90.0]}],
-        )
-    )
+    made(scalar({"equilibrium": [45.0], "feedback": LOOP}, [{"range": [-1.0, 90.0]}, {"range": [-1.0, 90.0]}]))
 
 
 def test_a_state_may_be_as_far_beyond_its_outputs_range_as_the_noise() -> None:
     """The range bounds the reading, not the state."""
-    noisy = made(
-        scalar(
-            {"disturbance": {"state": 0.02, "output": 0.5}},
-            [{"range": [-1.0, 1.0], "slew": [2.0]}, {"range": [-1.0, 1.0]}],
-        )
-    )
+    noisy = made(scalar({"disturbance": {"state": 0.02, "output": 0.5}}, [{"range": [-1.0, 1.0], "slew": [2.0]}, {"range": [-1.0, 1.0]}]))
     assert noisy.stored.state_range == pytest.approx([1.5])
 
 
@@ -162,10 +115,7 @@ def test_a_model_without_faults_is_designed() -> None:
 def frames_of(platoon: tuple[Design, Native], seed: int, count: int) -> list[tuple[int, Any]]:
     """All frames of a healthy drive, each with its sample."""
     shipped, native = platoon
-    plant, sender = (
-        Plant(native, shipped, Reference("mixed", 1.0, 60), (), seed),
-        Sender(native),
-    )
+    plant, sender = Plant(native, shipped, Reference("mixed", 1.0, 60), (), seed), Sender(native)
     frames = []
     for k in range(count):
         reading = plant.read()
@@ -191,22 +141,14 @@ def test_a_hole_in_a_log_is_an_outage_and_no_fault(platoon: tuple[Design, Native
     assert confirmed == []
 
 
-def test_a_tick_sender_that_begins_anew_is_no_fault(
-    platoon: tuple[Design, Native],
-) -> None:
+def test_a_tick_sender_that_begins_anew_is_no_fault(platoon: tuple[Design, Native]) -> None:
     """Counter and sample index start at 0 again while the plant goes on; at one place in sixteen they look like a repetition."""
     shipped, native = platoon
     confirmed = []
     for at in range(60, 76):
         for down in (0, 3):
             for seed in range(4):
-                plant, senders, ticks, node, begun = (
-                    Plant(native, shipped, Reference("mixed", 1.0, 20), (), seed),
-                    Sender(native),
-                    Sender(native),
-                    Node(native, REST),
-                    0,
-                )
+                plant, senders, ticks, node, begun = Plant(native, shipped, Reference("mixed", 1.0, 20), (), seed), Sender(native), Sender(native), Node(native, REST), 0
                 for k in range(140):
                     if k == at + down:
                         ticks, begun = Sender(native), k

@@ -94,10 +94,7 @@ def make_run(
     samples: int = 300,
     generators: int = 1,
     residuals: int = 2,
-    groups: tuple[tuple[str, tuple[str, ...]], ...] = (
-        ("measurement", ("gap12_m", "gap23_m", "speed1_mps")),
-        ("control", ("control1_mps2",)),
-    ),
+    groups: tuple[tuple[str, tuple[str, ...]], ...] = (("measurement", ("gap12_m", "gap23_m", "speed1_mps")), ("control", ("control1_mps2",))),
     faults: tuple[tuple[int, int | None, float], ...] = ((150, None, 1.0),),
     stale: tuple[int, int] | None = None,
     alarms: tuple[int, int] = (0, 0),
@@ -119,13 +116,7 @@ def make_run(
             readings.append(wave + 0.01 * rng.uniform(-1, 1, samples) + (0.3 * fault if place == 0 else 0.0))
             place += 1
         y = np.array(readings).T
-        event, held, value, radius, last = (
-            np.zeros(samples),
-            y[0].copy(),
-            np.zeros_like(y),
-            np.zeros_like(y),
-            -99,
-        )
+        event, held, value, radius, last = np.zeros(samples), y[0].copy(), np.zeros_like(y), np.zeros_like(y), -99
         for k in range(samples):
             lost = stale is not None and stale[0] <= k < stale[1] and g == 0
             if g == len(groups) - 1 or (not lost and (k - last >= 5 or np.any(np.abs(y[k] - held) > 0.05 * np.abs(held) + 0.05))):
@@ -137,11 +128,7 @@ def make_run(
         events[name] = event
         radius_sum += np.minimum(radius.mean(1), 1.0)
         for i, s in enumerate(members):
-            column |= {
-                s: y[:, i],
-                f"{s}.value": value[:, i],
-                f"{s}.radius": radius[:, i],
-            }
+            column |= {s: y[:, i], f"{s}.value": value[:, i], f"{s}.radius": radius[:, i]}
     worst = np.zeros(samples)
     before = samples if not faults else faults[0][0]
     taps = 0.75 ** np.arange(30)
@@ -177,10 +164,7 @@ def make_run(
     for k in range(samples):
         health = {name: "absent" if k < 1 else "stale" if stale and stale[0] + 9 <= k < stale[1] and i == 0 else "good" for i, name in enumerate(events)}
         entry = {"k": k, "plant": words[plant[k]], "bus": health}
-        if not verdicts or (entry["plant"], health) != (
-            verdicts[-1]["plant"],
-            verdicts[-1]["bus"],
-        ):
+        if not verdicts or (entry["plant"], health) != (verdicts[-1]["plant"], verdicts[-1]["bus"]):
             verdicts.append(entry)
     per_group = {}
     for name, e in events.items():
@@ -229,11 +213,7 @@ def make_run(
             for start, end, at in found
         ],
         "false_alarms": {"provisional": alarms[0], "confirmed": alarms[1]},
-        "communication": {
-            "crc_errors": 0,
-            "lost_frames": 4 if stale else 0,
-            "late_frames": 0,
-        },
+        "communication": {"crc_errors": 0, "lost_frames": 4 if stale else 0, "late_frames": 0},
         "margin_max": float(worst[10:before].max()),
         "verdicts": verdicts,
     }
@@ -274,17 +254,7 @@ def test_small_run(tmp_path: Path) -> None:
         assert f"{100 * info['frames'][key]:.3g} %" in text
     for count in info["per_group"]["measurement"]["histogram"].values():
         assert str(count) in text
-    for label in (
-        "r1.1",
-        "r1.2",
-        "time (s)",
-        "bus load (%)",
-        "gap12 (m)",
-        "speed1 (m/s)",
-        "control1 (m/s²)",
-        "late frames",
-        "Guaranteed:",
-    ):
+    for label in ("r1.1", "r1.2", "time (s)", "bus load (%)", "gap12 (m)", "speed1 (m/s)", "control1 (m/s²)", "late frames", "Guaranteed:"):
         assert label in text
     assert seen.counts["svg"] == 5
 
@@ -323,13 +293,7 @@ def test_false_alarms(tmp_path: Path) -> None:
 
 
 def test_several_faults(tmp_path: Path) -> None:
-    info = make_run(
-        tmp_path,
-        600,
-        3,
-        2,
-        faults=((100, 180, 1.0), (250, 330, 2.0), (335, 400, 0.02), (500, None, -1.5)),
-    )
+    info = make_run(tmp_path, 600, 3, 2, faults=((100, 180, 1.0), (250, 330, 2.0), (335, 400, 0.02), (500, None, -1.5)))
     assert info["faults"][2]["detected_at"] is None
     text, _ = check_html(write_run_report(tmp_path))
     assert "3 of 4 faults were found" in text
@@ -397,74 +361,32 @@ def without(column: str) -> Callable[[list[str]], list[str]]:
 
 BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "no run.json": (lambda d: (d / "run.json").unlink(), r"run\.json: no such file"),
-    "no signals.csv": (
-        lambda d: (d / "signals.csv").unlink(),
-        r"signals\.csv: no such file",
-    ),
-    "no labels.csv": (
-        lambda d: (d / "labels.csv").unlink(),
-        r"labels\.csv: no such file",
-    ),
+    "no signals.csv": (lambda d: (d / "signals.csv").unlink(), r"signals\.csv: no such file"),
+    "no labels.csv": (lambda d: (d / "labels.csv").unlink(), r"labels\.csv: no such file"),
     "no JSON": (lambda d: _put(d / "run.json", "{"), r"run\.json: not valid JSON"),
-    "JSON of another kind": (
-        lambda d: _put(d / "run.json", "[1]"),
-        r"run\.json: expected an object",
-    ),
-    "no UTF-8": (
-        lambda d: _put(d / "signals.csv", b"\xff\xfe\x00"),
-        r"signals\.csv: not UTF-8",
-    ),
+    "JSON of another kind": (lambda d: _put(d / "run.json", "[1]"), r"run\.json: expected an object"),
+    "no UTF-8": (lambda d: _put(d / "signals.csv", b"\xff\xfe\x00"), r"signals\.csv: not UTF-8"),
     "empty csv": (lambda d: _put(d / "signals.csv", ""), r"signals\.csv: empty"),
     "only names": (edit_csv(lambda lines: lines[:1]), r"signals\.csv: no samples"),
     "word in csv": (
         edit_csv(lambda lines: [*lines[:5], lines[5].replace(",", ",abc", 1), *lines[6:]]),
         r"signals\.csv: line 6, column 'k': 'abc5?4?' is not a number",
     ),
-    "short line": (
-        edit_csv(lambda lines: [*lines[:5], lines[5].rpartition(",")[0], *lines[6:]]),
-        r"signals\.csv: line 6 has \d+ fields",
-    ),
+    "short line": (edit_csv(lambda lines: [*lines[:5], lines[5].rpartition(",")[0], *lines[6:]]), r"signals\.csv: line 6 has \d+ fields"),
     "no column k": (edit_csv(without("k")), r"column 'k' is missing"),
     "no threshold": (edit_csv(without("J1.2")), r"column 'J1\.2' is missing"),
-    "no radius": (
-        edit_csv(without("gap12_m.radius")),
-        r"column 'gap12_m\.radius' is missing",
-    ),
-    "no event": (
-        edit_csv(without("event.measurement")),
-        r"column 'event\.measurement' is missing",
-    ),
+    "no radius": (edit_csv(without("gap12_m.radius")), r"column 'gap12_m\.radius' is missing"),
+    "no event": (edit_csv(without("event.measurement")), r"column 'event\.measurement' is missing"),
     "no bits": (edit_csv(without("bits")), r"column 'bits' is missing"),
-    "time goes back": (
-        edit_csv(lambda lines: [lines[0], lines[2], lines[1], *lines[3:]]),
-        r"must be numbers that grow",
-    ),
+    "time goes back": (edit_csv(lambda lines: [lines[0], lines[2], lines[1], *lines[3:]]), r"must be numbers that grow"),
     "no frames": (edit_json(lambda r: r.pop("frames")), r"key 'frames' is missing"),
-    "load is text": (
-        edit_json(lambda r: r["frames"].update(load_mean="much")),
-        r"'load_mean' is 'much', expected a finite number",
-    ),
-    "unknown verdict": (
-        edit_json(lambda r: r["verdicts"][0].update(plant="well")),
-        r"plant 'well' is not one of",
-    ),
-    "unknown bus health": (
-        edit_json(lambda r: r["verdicts"][0]["bus"].update(control="ill")),
-        r"bus 'ill' is not one of",
-    ),
+    "load is text": (edit_json(lambda r: r["frames"].update(load_mean="much")), r"'load_mean' is 'much', expected a finite number"),
+    "unknown verdict": (edit_json(lambda r: r["verdicts"][0].update(plant="well")), r"plant 'well' is not one of"),
+    "unknown bus health": (edit_json(lambda r: r["verdicts"][0]["bus"].update(control="ill")), r"bus 'ill' is not one of"),
     "no time": (edit_json(lambda r: r.update(sample_time_s=0)), r"must be above 0"),
-    "histogram": (
-        edit_json(lambda r: r["per_group"]["control"].update(histogram={"a": 1})),
-        r"'histogram' is not a count",
-    ),
-    "label column": (
-        lambda d: _put(d / "labels.csv", "start,name\n1,x\n"),
-        r"labels\.csv: column 'end' is missing",
-    ),
-    "label start": (
-        lambda d: _put(d / "labels.csv", "start,end,name,kind,size,signal\nsoon,,x,bias,1,x\n"),
-        r"labels\.csv: start 'soon' is not a sample",
-    ),
+    "histogram": (edit_json(lambda r: r["per_group"]["control"].update(histogram={"a": 1})), r"'histogram' is not a count"),
+    "label column": (lambda d: _put(d / "labels.csv", "start,name\n1,x\n"), r"labels\.csv: column 'end' is missing"),
+    "label start": (lambda d: _put(d / "labels.csv", "start,end,name,kind,size,signal\nsoon,,x,bias,1,x\n"), r"labels\.csv: start 'soon' is not a sample"),
 }
 
 
@@ -521,15 +443,8 @@ def test_design_report(tmp_path: Path, platoon: Design) -> None:
 
 def test_design_report_says_when_it_was_regularised(tmp_path: Path, platoon: Design) -> None:
     g = platoon.generators[0]
-    changed = replace(
-        g,
-        filter=replace(g.filter, regularised=1e-6),
-        blind=np.full_like(g.blind, math.inf),
-    )
-    stored = replace(
-        platoon.stored,
-        observers=(replace(platoon.stored.observers[0], regularised=1e-6),),
-    )
+    changed = replace(g, filter=replace(g.filter, regularised=1e-6), blind=np.full_like(g.blind, math.inf))
+    stored = replace(platoon.stored, observers=(replace(platoon.stored.observers[0], regularised=1e-6),))
     write_design_report(replace(platoon, generators=(changed,), stored=stored), tmp_path / "d.html")
     text, _ = check_html(tmp_path / "d.html")
     assert "regularised" in text and "∞" in text
@@ -541,15 +456,7 @@ def test_design_report_says_when_it_was_regularised(tmp_path: Path, platoon: Des
 def run_live(table: LiveTable, samples: int = 100) -> None:
     for k in range(samples):
         plant = "starting" if k < 5 else "none" if k < 60 else "confirmed"
-        table.update(
-            k,
-            [1.0] * 6,
-            [0.05] * 6,
-            [0.3, 1.2 if k >= 60 else 0.4],
-            plant,
-            {"measurement": "good", "control": "good"},
-            k + k // 3,
-        )
+        table.update(k, [1.0] * 6, [0.05] * 6, [0.3, 1.2 if k >= 60 else 0.4], plant, {"measurement": "good", "control": "good"}, k + k // 3)
 
 
 def test_live_without_a_terminal_prints_changes_only(platoon: Design) -> None:
@@ -562,37 +469,22 @@ def test_live_without_a_terminal_prints_changes_only(platoon: Design) -> None:
     assert "plant confirmed" in lines[2] and "measurement good" in lines[2]
 
 
-def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state(
-    platoon: Design,
-) -> None:
+def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state(platoon: Design) -> None:
     out = io.StringIO()
     began = time.monotonic()
-    with LiveTable(
-        platoon,
-        2000,
-        Console(file=out, force_terminal=True, width=100, height=40, color_system="standard"),
-    ) as table:
+    with LiveTable(platoon, 2000, Console(file=out, force_terminal=True, width=100, height=40, color_system="standard")) as table:
         run_live(table, 2000)
         drawn = table.drawn
     assert drawn <= 2 + 5 * (time.monotonic() - began)
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", out.getvalue())
-    for expected in (
-        "gap12_m",
-        "speed1_mps",
-        "r1.2",
-        "fault confirmed",
-        "2000 of 2000 samples",
-    ):
+    for expected in ("gap12_m", "speed1_mps", "r1.2", "fault confirmed", "2000 of 2000 samples"):
         assert expected in text
     assert out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0  # the cursor is back
 
 
 def test_live_ends_cleanly_when_interrupted(platoon: Design) -> None:
     out = io.StringIO()
-    with (
-        pytest.raises(KeyboardInterrupt),
-        LiveTable(platoon, 10, Console(file=out, force_terminal=True, width=100, height=40)) as table,
-    ):
+    with pytest.raises(KeyboardInterrupt), LiveTable(platoon, 10, Console(file=out, force_terminal=True, width=100, height=40)) as table:
         run_live(table, 10)
         raise KeyboardInterrupt
     assert out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0

@@ -24,23 +24,11 @@ from hullguard.core.native import (
 from hullguard.model import parse_fault
 from hullguard.plant.run import InProcess, Pace, Run, Trace
 
-FAULTS = (
-    "controller2:bias:1.0@60",
-    "gap12_m:freeze@100..120",
-    "speed1_mps:noise:0.1@130",
-    "controller1:gain:0.5@20..40",
-    "gap23_m:drift:0.2@140",
-)
+FAULTS = ("controller2:bias:1.0@60", "gap12_m:freeze@100..120", "speed1_mps:noise:0.1@130", "controller1:gain:0.5@20..40", "gap23_m:drift:0.2@140")
 
 
 def sample_by_sample(ready: Ready, samples: int, faults: tuple[str, ...], seed: int, pace: Pace) -> Trace:
-    source = Plant(
-        ready.native,
-        ready.design,
-        ready.reference,
-        [parse_fault(f) for f in faults],
-        seed,
-    )
+    source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in faults], seed)
     return Run(ready.design, ready.native, InProcess(), pace).samples(source, samples)
 
 
@@ -50,10 +38,7 @@ def sample_by_sample(ready: Ready, samples: int, faults: tuple[str, ...], seed: 
 def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(models: Models, real: str, scenario: str, faults: tuple[str, ...]) -> None:
     ready = models.platoon(scenario, None, real)
     for seed, lockstep in ((SEED, False), (SEED + 1, True)):
-        slow, fast = (
-            sample_by_sample(ready, 160, faults, seed, Pace(lockstep, 1e9)),
-            ready.batch(160, faults, seed).trace(0),
-        )
+        slow, fast = sample_by_sample(ready, 160, faults, seed, Pace(lockstep, 1e9)), ready.batch(160, faults, seed).trace(0)
         for name in ("reading", "value", "radius", "r", "J"):
             assert np.array_equal(np.array(getattr(slow, name)), fast[name]), name
         assert [PLANT_STATES.index(v.plant) for v in slow.verdict] == fast["plant"].tolist()
@@ -65,10 +50,7 @@ def test_a_run_in_python_differs_in_no_number_from_the_same_run_in_c(models: Mod
 
 def test_another_seed_gives_another_run(models: Models) -> None:
     ready = models.platoon("manoeuvres")
-    assert not np.array_equal(
-        ready.batch(50, (), SEED).trace(0)["reading"],
-        ready.batch(50, (), SEED + 1).trace(0)["reading"],
-    )
+    assert not np.array_equal(ready.batch(50, (), SEED).trace(0)["reading"], ready.batch(50, (), SEED + 1).trace(0)["reading"])
 
 
 @pytest.mark.parametrize("real", REALS)
@@ -96,23 +78,14 @@ const hg_sender_config *test_senders(void) { return hg_platoon_sender; }
 
 
 @pytest.fixture(scope="module", params=REALS)
-def generated(
-    request: pytest.FixtureRequest,
-    tmp_path_factory: pytest.TempPathFactory,
-    models: Models,
-) -> tuple[Ready, Library]:
+def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, models: Models) -> tuple[Ready, Library]:
     """The platoon's generated C compiled into a library of its own, beside the structures that Python fills."""
     folder: Path = tmp_path_factory.mktemp(f"generated_{request.param}")
     ready = models.platoon("manoeuvres", None, request.param)
     header, source = emit_c(ready.design)
     (folder / "include").mkdir()
     (folder / "include" / "platoon.h").write_text(header, encoding="ascii")
-    lib = build_library(
-        folder / "lib",
-        request.param,
-        extra=source + ACCESS,
-        includes=("-I", str(folder / "include")),
-    )
+    lib = build_library(folder / "lib", request.param, extra=source + ACCESS, includes=("-I", str(folder / "include")))
     lib.ffi.cdef("const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);")
     return ready, lib
 
@@ -133,13 +106,7 @@ def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(
     ready, lib = generated
     rng = np.random.default_rng(SEED)
     for start in (REST, 0):
-        source = Plant(
-            ready.native,
-            ready.design,
-            ready.reference,
-            [parse_fault(f) for f in FAULTS],
-            SEED,
-        )
+        source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in FAULTS], SEED)
         nodes = (Node(ready.native, start), generated_node(ready, lib, start))
         senders = (Sender(ready.native), generated_senders(ready, lib))
         answers = 0
@@ -180,22 +147,7 @@ def test_the_committed_tables_are_those_of_the_design(models: Models) -> None:
 
 
 def test_a_campaign_is_the_batch_it_says_it_is(models: Models, cli: Cli) -> None:
-    rows = cli(
-        "campaign",
-        "platoon",
-        "--scenario",
-        "manoeuvres",
-        "--runs",
-        7,
-        "--workers",
-        1,
-        "--seed",
-        5,
-        "--samples",
-        90,
-        "--json",
-        "-q",
-    ).json["rows"]
+    rows = cli("campaign", "platoon", "--scenario", "manoeuvres", "--runs", 7, "--workers", 1, "--seed", 5, "--samples", 90, "--json", "-q").json["rows"]
     assert rows == [r | {"attacked": 0} for r in models.platoon("manoeuvres").batch(90, seed=5).runs(0, 7)]
 
 

@@ -57,11 +57,7 @@ def worst_case(ready: Ready, residual: int, k: int) -> tuple[np.ndarray[Any, Any
 def ratio_at(ready: Ready, residual: int, k: int, sign: float = 1.0, runs: int = 8) -> float:
     """Largest |r|/J at sample k over runs that differ in their inputs only."""
     d, x0 = worst_case(ready, residual, k)
-    batch = ready.batch(
-        LENGTH,
-        disturbance=sign * d,
-        initial=sign * x0 * ready.design.model.plant.initial_range,
-    )
+    batch = ready.batch(LENGTH, disturbance=sign * d, initial=sign * x0 * ready.design.model.plant.initial_range)
     lib = ready.native.library.lib
     largest = 0.0
     for run in range(runs):
@@ -95,9 +91,7 @@ def test_no_periodic_residual_as_designed_exceeds_its_threshold(models: Models, 
         assert 0.85 <= ratio_at(ready, i, k, runs=200) <= 1.0
 
 
-def test_the_bound_on_what_lies_behind_the_taps_does_not_cost_2_percent_of_a_threshold(
-    models: Models,
-) -> None:
+def test_the_bound_on_what_lies_behind_the_taps_does_not_cost_2_percent_of_a_threshold(models: Models) -> None:
     for generator in models.design().generators:
         tables = generator.tables
         behind = tables.tail_output * (tables.tail_input * generator.radius).sum() / (1 - tables.decay)
@@ -126,22 +120,11 @@ def pattern(ready: Ready, loss: float, run: int, samples: int) -> tuple[dict[str
     return trace, np.cumsum(fresh) - 1, radius, gaps
 
 
-def largest_residual(
-    ready: Ready,
-    residual: int,
-    k: int,
-    segment: np.ndarray[Any, Any],
-    radius: np.ndarray[Any, Any],
-) -> float:
+def largest_residual(ready: Ready, residual: int, k: int, segment: np.ndarray[Any, Any], radius: np.ndarray[Any, Any]) -> float:
     """Largest r at sample k that a healthy plant within its bounds can cause, held values within these radii of the outputs."""
     generator = ready.design.generators[0]
     plant, fused, model = generator.plant, generator.linear, ready.design.model
-    n, nd, order, held = (
-        plant.A.shape[0],
-        plant.Ed.shape[1],
-        fused.state.shape[0],
-        int(segment[k]) + 1,
-    )
+    n, nd, order, held = plant.A.shape[0], plant.Ed.shape[1], fused.state.shape[0], int(segment[k]) + 1
     d0, u0, h0 = n, n + (k + 1) * nd, n + (k + 1) * (nd + INPUTS)
     count = h0 + OUTPUTS * held
     limit = np.full(count, np.inf)
@@ -152,35 +135,20 @@ def largest_residual(
     x[:, :n] = np.eye(n)
     rows, bounds, r = [], [], np.zeros(count)
     for j in range(k + 1):
-        d, u, h = (
-            slice(d0 + j * nd, d0 + (j + 1) * nd),
-            slice(u0 + j * INPUTS, u0 + (j + 1) * INPUTS),
-            h0 + OUTPUTS * int(segment[j]),
-        )
+        d, u, h = slice(d0 + j * nd, d0 + (j + 1) * nd), slice(u0 + j * INPUTS, u0 + (j + 1) * INPUTS), h0 + OUTPUTS * int(segment[j])
         y = plant.C @ x
         y[:, d] += plant.Fd
         value = np.zeros((OUTPUTS + INPUTS, count))
         value[:OUTPUTS, h : h + OUTPUTS] = np.eye(OUTPUTS)
         value[OUTPUTS:, u] = np.eye(INPUTS)
         rows += [y - value[:OUTPUTS], value[:OUTPUTS] - y, x, -x]
-        bounds += [
-            radius[j],
-            radius[j],
-            ready.design.stored.state_range,
-            ready.design.stored.state_range,
-        ]
+        bounds += [radius[j], radius[j], ready.design.stored.state_range, ready.design.stored.state_range]
         r = fused.output[residual] @ z + fused.direct[residual] @ value
         z = fused.state @ z + fused.input @ value
         x = plant.A @ x
         x[:, d] += plant.Ed
         x[:, u] += plant.B
-    solved = linprog(
-        -r,
-        A_ub=np.vstack(rows),
-        b_ub=np.concatenate(bounds),
-        bounds=np.column_stack([-limit, limit]),
-        method="highs",
-    )
+    solved = linprog(-r, A_ub=np.vstack(rows), b_ub=np.concatenate(bounds), bounds=np.column_stack([-limit, limit]), method="highs")
     assert solved.status == 0, solved.message
     return float(-solved.fun)
 
@@ -207,9 +175,7 @@ def after_gaps(models: Models, lib: Library) -> list[float]:
     return ratios
 
 
-def test_no_held_value_brings_a_residual_over_its_threshold_after_a_lost_frame_has_shown(
-    models: Models,
-) -> None:
+def test_no_held_value_brings_a_residual_over_its_threshold_after_a_lost_frame_has_shown(models: Models) -> None:
     ratios = after_gaps(models, library("f32"))
     assert len(ratios) >= 4, "no gap fell into these runs"
     assert max(ratios) <= 1.0
@@ -218,30 +184,9 @@ def test_no_held_value_brings_a_residual_over_its_threshold_after_a_lost_frame_h
 
 # ---- libraries that are wrong on purpose ----
 
-NO_SILENCE = {
-    "hold.c": [
-        (
-            "if ((!self->lost) && (self->age > silence(self))) {",
-            "if ((!self->lost) && (silence(self) < 255U)) {",
-        )
-    ]
-}
-NO_REWRITING = {
-    "detector.c": [
-        (
-            "hg_ring_rewrite(&self->radii, lag, first, width, &self->past[first]);",
-            "(void)first;",
-        )
-    ]
-}
-NO_REWIND = {
-    "hold.c": [
-        (
-            "*rewind = (newly_lost || (self->fresh && self->gap)) ? (uint8_t)(self->gap_age - 1U) : 0U;",
-            "*rewind = 0U; (void)newly_lost;",
-        )
-    ]
-}
+NO_SILENCE = {"hold.c": [("if ((!self->lost) && (self->age > silence(self))) {", "if ((!self->lost) && (silence(self) < 255U)) {")]}
+NO_REWRITING = {"detector.c": [("hg_ring_rewrite(&self->radii, lag, first, width, &self->past[first]);", "(void)first;")]}
+NO_REWIND = {"hold.c": [("*rewind = (newly_lost || (self->fresh && self->gap)) ? (uint8_t)(self->gap_age - 1U) : 0U;", "*rewind = 0U; (void)newly_lost;")]}
 NO_CANCEL = {"decision.c": [("((alarm->pending & evidence->rewound) != 0U)", "false")]}
 SMALL_J = {
     "hull.c": [
@@ -271,10 +216,7 @@ def worst_held(models: Models, lib: Library) -> float:
     largest = 0.0
     for run in range(3):
         trace, segment, radius, _ = pattern(ready, 0.0, run, 81)
-        largest = max(
-            largest,
-            *(largest_residual(ready, i, k, segment, radius) / trace["J"][k, i] for i in residuals(ready) for k in (12, 40, 60, 80)),
-        )
+        largest = max(largest, *(largest_residual(ready, i, k, segment, radius) / trace["J"][k, i] for i in residuals(ready) for k in (12, 40, 60, 80)))
     return largest
 
 

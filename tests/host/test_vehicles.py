@@ -313,21 +313,7 @@ def test_the_command_designs_and_runs_it(cli: Cli, vehicles: int, tmp_path: Path
     found = done.json
     assert len(found["generators"]) == (1 if vehicles == 2 else 20)
     assert all(c["passed"] for c in found["checks"])
-    done = cli(
-        "run",
-        "platoon",
-        "--set",
-        f"plant.vehicles={vehicles}",
-        "--bus",
-        "inprocess",
-        "--samples",
-        200,
-        "--fault",
-        f"controller{vehicles}:bias:2.0@100",
-        "--expect",
-        "detect",
-        "--json",
-    )
+    done = cli("run", "platoon", "--set", f"plant.vehicles={vehicles}", "--bus", "inprocess", "--samples", 200, "--fault", f"controller{vehicles}:bias:2.0@100", "--expect", "detect", "--json")
     assert done.status == 0, done.err
     assert done.json["false_alarms"] == {"provisional": 0, "confirmed": 0}
     assert f"controller{vehicles}" in done.json["faults"][0]["candidates"]

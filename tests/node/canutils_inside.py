@@ -44,19 +44,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         with (folder / "candump.log").open("w") as file:
             dump = subprocess.Popen(["candump", "-L", "-r", "4000000", "vcan0"], stdout=file)
             time.sleep(0.3)
-            status, said = run(
-                [
-                    "run",
-                    model,
-                    "--seed",
-                    SEED,
-                    "--bus",
-                    "vcan0",
-                    "--out",
-                    folder,
-                    "--json",
-                ]
-            )
+            status, said = run(["run", model, "--seed", SEED, "--bus", "vcan0", "--out", folder, "--json"])
             time.sleep(0.3)
             dump.send_signal(signal.SIGINT)
             dump.wait(10)
@@ -77,19 +65,7 @@ def test_canplayer_into_detect(model: str, recorded: dict[str, Path], tmp_path: 
     fast = tmp_path / "fast.log"
     fast.write_text("".join(candump.line(e.time_s / 20, e.channel, e.frame) + "\n" for e in candump.read(recorded[model] / "run.log")))
     result = json.loads((recorded[model] / "run.json").read_text())
-    options = (
-        "-i",
-        "socketcan",
-        "-c",
-        "vcan0",
-        "--rest",
-        "--lockstep",
-        "--listen",
-        "--ready",
-        "--json",
-        "--samples",
-        result["samples"],
-    )
+    options = ("-i", "socketcan", "-c", "vcan0", "--rest", "--lockstep", "--listen", "--ready", "--json", "--samples", result["samples"])
     with detect(model, *options) as n:
         subprocess.run(["canplayer", "-I", str(fast)], check=True, timeout=30)
         n.wait(30)
@@ -101,15 +77,7 @@ def test_canplayer_into_detect(model: str, recorded: dict[str, Path], tmp_path: 
 
 def test_canplayer_keeps_the_runs_pace(recorded: dict[str, Path], tmp_path: Path) -> None:
     """The stamps of run.log are a clock that canplayer can follow: 20 samples take two seconds."""
-    first = [
-        line
-        for line, e in zip(
-            (recorded["platoon"] / "run.log").read_text().splitlines(),
-            candump.read(recorded["platoon"] / "run.log"),
-            strict=True,
-        )
-        if e.time_s < 2.05
-    ]
+    first = [line for line, e in zip((recorded["platoon"] / "run.log").read_text().splitlines(), candump.read(recorded["platoon"] / "run.log"), strict=True) if e.time_s < 2.05]
     (tmp_path / "short.log").write_text("\n".join(first) + "\n")
     began = time.monotonic()
     subprocess.run(["canplayer", "-I", str(tmp_path / "short.log")], check=True, timeout=30)
@@ -120,10 +88,7 @@ def test_canplayer_keeps_the_runs_pace(recorded: dict[str, Path], tmp_path: Path
 @pytest.mark.parametrize("model", ["platoon", "openacc"])
 def test_detect_reads_both_logs(model: str, log: str, recorded: dict[str, Path]) -> None:
     status, said = run(["detect", model, "--rest", "--log", recorded[model] / log, "--json"])
-    told, result = (
-        json.loads(said),
-        json.loads((recorded[model] / "run.json").read_text()),
-    )
+    told, result = json.loads(said), json.loads((recorded[model] / "run.json").read_text())
     assert status == 0 and told["verdicts"] == result["verdicts"]
 
 

@@ -24,18 +24,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         out = Path(tempfile.mkdtemp(prefix="hullguard-timing-"))
         runs = [f"{name}:{ticks}:{drop}" for name, (ticks, drop) in TICKS.items()]
         command = in_guest("sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=150)
-        _started.append(
-            (
-                subprocess.Popen(
-                    command,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.STDOUT,
-                    text=True,
-                    env=environment(),
-                ),
-                out,
-            )
-        )
+        _started.append((subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment()), out))
 
 
 def pytest_sessionfinish() -> None:

@@ -60,13 +60,7 @@ class Process:
 @contextlib.contextmanager
 def process(*command: object) -> Iterator[Process]:
     """A program that prints 'ready' first; stopped at the end unless it has been before."""
-    popen = subprocess.Popen(
-        [str(c) for c in command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-    )
+    popen = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment())
     made = Process(popen)
     try:
         assert popen.stdout is not None
@@ -99,26 +93,10 @@ def reachable(native: Native, frame: Frame) -> bool:
 class Drive:
     """Frames of an emulated plant, and a node in this process that gets what the one on the bus gets."""
 
-    def __init__(
-        self,
-        model: str = "platoon",
-        scenario: str = "manoeuvres",
-        faults: tuple[str, ...] = (),
-        seed: int = SEED,
-    ) -> None:
+    def __init__(self, model: str = "platoon", scenario: str = "manoeuvres", faults: tuple[str, ...] = (), seed: int = SEED) -> None:
         self.design, self.native = ready(model)
-        self.source = Plant(
-            self.native,
-            self.design,
-            self.design.model.scenario(scenario).reference,
-            [parse_fault(f) for f in faults],
-            seed,
-        )
-        self.sender, self.shadow, self.k = (
-            Sender(self.native),
-            Node(self.native, REST),
-            0,
-        )
+        self.source = Plant(self.native, self.design, self.design.model.scenario(scenario).reference, [parse_fault(f) for f in faults], seed)
+        self.sender, self.shadow, self.k = Sender(self.native), Node(self.native, REST), 0
         closing = self.native.tables.closing
         self.order = [g for g in range(len(self.native.tables.groups)) if g != closing] + [closing]
 

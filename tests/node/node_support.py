@@ -10,10 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build"
-NODE = {
-    "f32": BUILD / "bin" / "detector_node",
-    "f64": BUILD / "bin" / "detector_node_f64",
-}
+NODE = {"f32": BUILD / "bin" / "detector_node", "f64": BUILD / "bin" / "detector_node_f64"}
 BUS_TIMER = BUILD / "node" / "bus_timer"
 ORACLE_RUN = BUILD / "oracle" / "oracle_run"
 WITH_VCAN = BUILD / "with-vcan" / "with-vcan"
@@ -26,28 +23,12 @@ Result = subprocess.CompletedProcess[str]
 def environment(**more: str) -> dict[str, str]:
     """What commands find the package and the seed by."""
     path = os.pathsep.join([str(ROOT / "host_tools"), *filter(None, [os.environ.get("PYTHONPATH")])])
-    return (
-        os.environ
-        | {
-            "PYTHONPATH": path,
-            "PYTHONDONTWRITEBYTECODE": "1",
-            "HULLGUARD_SEED": str(SEED),
-        }
-        | more
-    )
+    return os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "HULLGUARD_SEED": str(SEED)} | more
 
 
 def command(arguments: list[str], timeout_s: float = 120, **more: str) -> Result:
     """A program to its end."""
-    return subprocess.run(
-        arguments,
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=timeout_s,
-        env=environment(**more),
-        cwd=ROOT,
-    )
+    return subprocess.run(arguments, check=False, capture_output=True, text=True, timeout=timeout_s, env=environment(**more), cwd=ROOT)
 
 
 def hullguard(*arguments: object) -> list[str]:
@@ -57,40 +38,12 @@ def hullguard(*arguments: object) -> list[str]:
 
 def in_guest(*arguments: object, interfaces: int = 1, timeout_s: int = 100) -> list[str]:
     """A command line inside with-vcan."""
-    return [
-        str(WITH_VCAN),
-        "-n",
-        str(interfaces),
-        "-t",
-        str(timeout_s),
-        *map(str, arguments),
-    ]
+    return [str(WITH_VCAN), "-n", str(interfaces), "-t", str(timeout_s), *map(str, arguments)]
 
 
 def run_inside(file: str, out: Path, interfaces: int = 1, timeout_s: int = 100) -> None:
     """Run the tests of a file where vcan0 exists; what fails there fails here, with its text."""
-    options = [
-        "-q",
-        "-rfE",
-        "--tb=short",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:hypothesispytest",
-        "--durations=5",
-        f"--basetemp={out}/inside",
-    ]
-    done = command(
-        in_guest(
-            sys.executable,
-            "-m",
-            "pytest",
-            *options,
-            HERE / file,
-            interfaces=interfaces,
-            timeout_s=timeout_s,
-        ),
-        timeout_s + 30,
-    )
+    options = ["-q", "-rfE", "--tb=short", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--durations=5", f"--basetemp={out}/inside"]
+    done = command(in_guest(sys.executable, "-m", "pytest", *options, HERE / file, interfaces=interfaces, timeout_s=timeout_s), timeout_s + 30)
     print(done.stdout)
     assert done.returncode == 0, f"{file} inside with-vcan: exit status {done.returncode}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"

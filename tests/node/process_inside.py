@@ -29,10 +29,7 @@ from inside_support import (
 from node_support import NODE, command, hullguard
 
 ALARMS = ("provisional", "confirmed")
-NEVER = (
-    "--period",
-    "3600000",
-)  # without lockstep, but the deadline does not come during a test
+NEVER = ("--period", "3600000")  # without lockstep, but the deadline does not come during a test
 
 
 def alarmed(verdicts: list, state: str) -> bool:
@@ -78,10 +75,7 @@ def test_a_timing_file_that_cannot_be_written_is_status_1(tmp_path: Path) -> Non
 
 def test_an_interface_that_goes_down_and_comes_back() -> None:
     drive = Drive()
-    with (
-        link("vcan1") as bus,
-        node("--interface", "vcan1", "--lockstep", "--rest", "--status") as n,
-    ):
+    with link("vcan1") as bus, node("--interface", "vcan1", "--lockstep", "--rest", "--status") as n:
         for k in range(40):
             if k == 20:
                 subprocess.run(["ip", "link", "set", "vcan1", "down"], check=True)
@@ -109,11 +103,7 @@ def test_heartbeat_and_verdict_on_change() -> None:
             frames, tick = drive.sample()
             last = frames[0] if frames else last
             sent = [*frames, tick]
-            if drive.k - 1 in (
-                33,
-                57,
-                101,
-            ):  # a damaged frame: the bus is no longer good
+            if drive.k - 1 in (33, 57, 101):  # a damaged frame: the bus is no longer good
                 sent.insert(0, Frame(last.id, last.flags, bytes(8)))
             made, answers = drive.take(sent, lockstep=False)
             verdicts, expected = verdicts + made, expected + answers
@@ -191,11 +181,7 @@ def spoilt(good: Frame) -> dict[str, Frame]:
     return out
 
 
-FILTERED = (
-    "remote",
-    "extended",
-    "extended remote",
-)  # not for this node: its filter keeps them away
+FILTERED = ("remote", "extended", "extended remote")  # not for this node: its filter keeps them away
 
 
 @pytest.mark.parametrize("place", ["between", "instead"])
@@ -297,17 +283,10 @@ def test_a_stopped_node_is_no_plant_fault() -> None:
 
 
 def test_two_nodes_on_one_bus() -> None:
-    platoon, openacc = (
-        Drive("platoon", "default", ("controller2:bias:3@60",)),
-        Drive("openacc", "default", ("gap3_m:bias:3@90",)),
-    )
+    platoon, openacc = Drive("platoon", "default", ("controller2:bias:3@60",)), Drive("openacc", "default", ("gap3_m:bias:3@90",))
     seen: dict[str, list] = {"platoon": [], "openacc": []}
     ids = {platoon.verdict_id, platoon.status_id, openacc.verdict_id, openacc.status_id}
-    with (
-        link() as bus,
-        node("--model", "platoon", "--lockstep", "--rest", "--status") as a,
-        node("--model", "openacc", "--lockstep", "--rest", "--status") as b,
-    ):
+    with link() as bus, node("--model", "platoon", "--lockstep", "--rest", "--status") as a, node("--model", "openacc", "--lockstep", "--rest", "--status") as b:
         for _ in range(150):
             together, expected = [], []
             for name, drive in (("platoon", platoon), ("openacc", openacc)):
@@ -341,10 +320,7 @@ ON_BUS = ("-i", "socketcan", "-c", "vcan0")
 def test_plant_and_node_by_hand(other: str) -> None:
     started = detect("platoon", *ON_BUS, "--lockstep", "--rest", "--ready", "--json") if other == "detect" else node("--lockstep", "--rest")
     with started as n:
-        plant = command(
-            hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--json"),
-            timeout_s=30,
-        )
+        plant = command(hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--json"), timeout_s=30)
         n.stop()
     assert plant.returncode == 0, plant.stderr
     result = json.loads(plant.stdout)
@@ -358,19 +334,7 @@ def test_plant_and_node_by_hand(other: str) -> None:
 
 def test_plant_notices_a_node_that_says_something_else() -> None:
     with node("--lockstep"):  # without --rest it knows less
-        plant = command(
-            hullguard(
-                "plant",
-                "platoon",
-                *ON_BUS,
-                "--lockstep",
-                "--speed",
-                "max",
-                "--scenario",
-                "rest",
-            ),
-            timeout_s=30,
-        )
+        plant = command(hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--scenario", "rest"), timeout_s=30)
     assert plant.returncode == 1
     assert re.fullmatch(r"hullguard: the node's verdicts differ[^\n]*\n", plant.stderr)
 
@@ -378,39 +342,14 @@ def test_plant_notices_a_node_that_says_something_else() -> None:
 def test_plant_without_a_node_says_so() -> None:
     """Ten seconds of patience, shortened here; the message names the cure."""
     code = "import hullguard.plant.run as r, sys; r.ANSWER_TIMEOUT_S = 0.3; from hullguard.cli import main; sys.exit(main(sys.argv[1:]))"
-    done = command(
-        [
-            sys.executable,
-            "-c",
-            code,
-            "plant",
-            "platoon",
-            *ON_BUS,
-            "--lockstep",
-            "--speed",
-            "max",
-        ]
-    )
+    done = command([sys.executable, "-c", code, "plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max"])
     assert done.returncode == 3 and re.fullmatch(r"hullguard: [^\n]*did not answer sample 0[^\n]*--lockstep[^\n]*\n", done.stderr)
 
 
 def test_detect_listens_and_says_nothing_on_the_bus() -> None:
     drive = Drive("platoon", "default", ("controller2:bias:3@60",))
     verdicts = []
-    with (
-        link() as bus,
-        detect(
-            "platoon",
-            *ON_BUS,
-            "--rest",
-            "--lockstep",
-            "--listen",
-            "--ready",
-            "--json",
-            "--samples",
-            120,
-        ) as n,
-    ):
+    with link() as bus, detect("platoon", *ON_BUS, "--rest", "--lockstep", "--listen", "--ready", "--json", "--samples", 120) as n:
         for _ in range(120):
             frames, tick = drive.sample()
             verdicts += drive.take([*frames, tick])[0]

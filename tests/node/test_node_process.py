@@ -44,10 +44,7 @@ def test_what_it_says_of_itself(real: str) -> None:
     assert "--lockstep" in command([str(NODE[real]), "--help"]).stdout
     listed = command([str(NODE[real]), "--list"])
     assert listed.returncode == 0
-    assert {line.split()[0] for line in listed.stdout.splitlines()} >= {
-        "platoon",
-        "openacc",
-    }
+    assert {line.split()[0] for line in listed.stdout.splitlines()} >= {"platoon", "openacc"}
 
 
 def test_no_such_bus_is_status_3_in_one_line() -> None:
@@ -56,12 +53,7 @@ def test_no_such_bus_is_status_3_in_one_line() -> None:
         node = command([*guest, str(NODE["f32"]), "--interface", "vcan9"])
         assert (node.returncode, node.stdout) == (3, "")
         assert re.fullmatch(r"detector_node: [^\n]+\n", node.stderr)
-        run = command(
-            [
-                *guest,
-                *hullguard("run", "platoon", "--bus", "vcan9", "--scenario", "rest", "--json"),
-            ]
-        )
+        run = command([*guest, *hullguard("run", "platoon", "--bus", "vcan9", "--scenario", "rest", "--json")])
         assert (run.returncode, run.stdout) == (3, "")
         assert re.fullmatch(r"hullguard: [^\n]+\n", run.stderr)
     assert "vcan9" in node.stderr and "vcan9" in run.stderr
@@ -73,14 +65,7 @@ def test_bus_auto_finds_a_bus_and_says_which(tmp_path: Path) -> None:
     done = command(hullguard("run", "platoon", "--samples", "20", "--no-fault", "--out", tmp_path))
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    how = (
-        [f"bus: {made_here}"]
-        if made_here
-        else [
-            "bus: vcan0 in a network namespace of its own",
-            "bus: vcan0 in User-Mode Linux, because this kernel has no CAN",
-        ]
-    )
+    how = [f"bus: {made_here}"] if made_here else ["bus: vcan0 in a network namespace of its own", "bus: vcan0 in User-Mode Linux, because this kernel has no CAN"]
     assert [line for line in lines if line.startswith("bus: ")] in [[x] for x in how]
     assert "node: detector_node, a process of its own" in lines
     result = json.loads((tmp_path / "run.json").read_text())
@@ -94,19 +79,11 @@ def test_without_a_launcher_auto_is_in_process_and_says_so(tmp_path: Path) -> No
     if choose.existing_vcan():
         return  # nothing is launched here; the test above has seen it
     moved = tmp_path / "host_tools"
-    shutil.copytree(
-        Path(choose.__file__).parents[1],
-        moved / "hullguard",
-        ignore=shutil.ignore_patterns("__pycache__"),
-    )
+    shutil.copytree(Path(choose.__file__).parents[1], moved / "hullguard", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(choose.ROOT / "host_tools" / "models", moved / "models")
     shutil.copytree(choose.ROOT / "build" / "lib", tmp_path / "build" / "lib")
     path = os.pathsep.join(p for p in os.environ["PATH"].split(os.pathsep) if not (Path(p) / "with-vcan").exists())
-    done = command(
-        hullguard("run", "platoon", "--samples", "20", "--no-fault"),
-        PYTHONPATH=str(moved),
-        PATH=path,
-    )
+    done = command(hullguard("run", "platoon", "--samples", "20", "--no-fault"), PYTHONPATH=str(moved), PATH=path)
     assert done.returncode == 0, done.stderr
     assert "bus: in process (no CAN bus)" in done.stdout.splitlines()
 

@@ -42,37 +42,13 @@ class Case:
         return self.scenario != "adaptive"
 
     def arguments(self, out: Path, bus: str) -> list[str]:
-        return [
-            "run",
-            self.model,
-            "--scenario",
-            self.scenario,
-            "--real",
-            self.real,
-            "--seed",
-            str(SEED),
-            "--bus",
-            bus,
-            "--out",
-            str(out / self.name),
-            "--json",
-        ]
+        return ["run", self.model, "--scenario", self.scenario, "--real", self.real, "--seed", str(SEED), "--bus", bus, "--out", str(out / self.name), "--json"]
 
 
-EVERY = [
-    ("platoon", "default"),
-    ("platoon", "rest"),
-    ("platoon", "manoeuvres"),
-    ("platoon", "adaptive"),
-    ("openacc", "default"),
-]
+EVERY = [("platoon", "default"), ("platoon", "rest"), ("platoon", "manoeuvres"), ("platoon", "adaptive"), ("openacc", "default")]
 SINGLE = [Case(m, s, "f32") for m, s in EVERY]
 DOUBLE = [Case(m, s, "f64") for m, s in EVERY]
-ON_VCAN = [
-    *SINGLE,
-    Case("platoon", "default", "f64"),
-    Case("openacc", "default", "f64"),
-]
+ON_VCAN = [*SINGLE, Case("platoon", "default", "f64"), Case("openacc", "default", "f64")]
 HERE_AND_NOW = [*SINGLE, *DOUBLE]
 BUS_STATES = ("absent", "good", "lossy", "stale")
 PLANTS = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
@@ -111,25 +87,12 @@ class Ended:
 def made(folder: Path, cases: list[Case], bus: str, launch: list[str]) -> dict[Case, Ended]:
     folder.mkdir()
     (folder / "commands").write_text(json.dumps({c.name: c.arguments(folder, bus) for c in cases}))
-    done = command(
-        [
-            *launch,
-            sys.executable,
-            str(HERE / "commands_inside.py"),
-            str(folder / "commands"),
-        ],
-        HULLGUARD_INSIDE="1",
-    )
+    done = command([*launch, sys.executable, str(HERE / "commands_inside.py"), str(folder / "commands")], HULLGUARD_INSIDE="1")
     assert done.returncode == 0, f"{' '.join(launch)}: exit status {done.returncode}: {done.stdout} {done.stderr}"
     found = {}
     for c in cases:
         told = json.loads((folder / f"{c.name}.json").read_text())
-        found[c] = Ended(
-            told["status"],
-            json.loads(told["out"] or "{}"),
-            told["err"],
-            folder / c.name,
-        )
+        found[c] = Ended(told["status"], json.loads(told["out"] or "{}"), told["err"], folder / c.name)
     return found
 
 
@@ -233,13 +196,7 @@ def oracle(case: Case, run: Ended, folder: Path) -> Chain:
     rows = np.array([[float(x) for x in line.split(",")] for line in done.stdout.splitlines()])
     width = ready.tables.residuals
     assert rows.shape == (len(columns["k"]), 3 + 2 * width)
-    return Chain(
-        ready,
-        rows[:, 1].astype(int).tolist(),
-        rows[:, 2].astype(int).tolist(),
-        rows[:, 3 : 3 + width],
-        rows[:, 3 + width :],
-    )
+    return Chain(ready, rows[:, 1].astype(int).tolist(), rows[:, 2].astype(int).tolist(), rows[:, 3 : 3 + width], rows[:, 3 + width :])
 
 
 def bus_bits(run: Ended, groups: list[str]) -> list[int]:

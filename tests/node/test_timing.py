@@ -72,21 +72,10 @@ def read(folder: Path, name: str) -> Seen:
     plants = {m[1] for line in lines[1:] if (m := re.search(r"plant=(\w+)", line))}
     # After the last tick every deadline is missed, and rightly so: the node is stopped a little later.
     while_sent = [m for m in every if m.start <= told["last_us"]]
-    return Seen(
-        while_sent,
-        len(every),
-        int(head[1]),
-        gaps,
-        told,
-        numbers((folder / f"{name}.send").read_text()),
-        lines[-1],
-        plants,
-    )
+    return Seen(while_sent, len(every), int(head[1]), gaps, told, numbers((folder / f"{name}.send").read_text()), lines[-1], plants)
 
 
-def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(
-    timing_files: Path,
-) -> None:
+def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(timing_files: Path) -> None:
     seen = read(timing_files, "steady")
     print(f"{len(seen.misses)} missed, {len(seen.gaps)} gaps; longest {seen.watch['longest_tick_us']} us between ticks, {seen.watch['longest_wake_us']} us between wake-ups")
     assert seen.watch["last_us"] - seen.watch["first_us"] >= 59.9e6
@@ -97,13 +86,7 @@ def test_every_missed_deadline_lies_in_a_gap_that_the_reference_saw(
 def test_no_frame_is_lost(timing_files: Path) -> None:
     seen = read(timing_files, "steady")
     assert seen.send["ticks"] == seen.send["control"] == seen.watch["ticks"] == TICKS["steady"][0]
-    assert (
-        seen.counter("dropped"),
-        seen.counter("malformed"),
-        seen.counter("unsent"),
-        seen.counter("errors"),
-        seen.counter("can"),
-    ) == ("0", "0", "0", "0", "active")
+    assert (seen.counter("dropped"), seen.counter("malformed"), seen.counter("unsent"), seen.counter("errors"), seen.counter("can")) == ("0", "0", "0", "0", "active")
     assert seen.watch["lost"] == 0
     for group in ("measurement", "control"):
         good, lost, refused = seen.health(group)
@@ -136,12 +119,7 @@ def test_a_dropped_tick_is_an_unexplained_miss(timing_files: Path) -> None:
 
 def test_the_judge() -> None:
     gap = Span(1_000_000, 1_016_000)
-    inside, edge, before, after = (
-        Span(1_015_000, 1_016_000),
-        Span(1_026_000, 1_026_500),
-        Span(989_999, 990_100),
-        Span(1_026_001, 1_026_100),
-    )
+    inside, edge, before, after = Span(1_015_000, 1_016_000), Span(1_026_000, 1_026_500), Span(989_999, 990_100), Span(1_026_001, 1_026_100)
     assert unexplained([inside, edge], [gap]) == []
     assert unexplained([inside, before, edge, after], [gap]) == [before, after]
     assert unexplained([inside], []) == [inside]

@@ -41,14 +41,7 @@ def generated(made: Design, native: Native, samples: int) -> Array:
     """A drive of the emulator, without sensor noise: what a recording would hold."""
     quiet = np.random.default_rng(SEED).uniform(-1, 1, (samples, made.model.plant.Ed.shape[1]))
     quiet[:, made.model.plant.n :] = 0.0  # the columns behind the states' own are the sensors' noise
-    trace = Batch(
-        native,
-        made,
-        samples,
-        made.model.scenario(None).reference,
-        seed=SEED,
-        disturbance=quiet,
-    ).trace()
+    trace = Batch(native, made, samples, made.model.scenario(None).reference, seed=SEED, disturbance=quiet).trace()
     return trace["reading"]
 
 
@@ -63,41 +56,17 @@ def identified(made: Design, series: Array) -> list[tuple[str, float, float]]:
         v, a = col[f"speed{i}_mps"], col[f"accel{i}_mps2"]
         row = model.plant.states.index(f"speed{i}_mps")
         own = float(model.plant.Ed[row, row])
-        found.append(
-            (
-                f"speed{i} disturbance, m/s",
-                float(np.abs(np.diff(v) - period * a[:-1]).max()),
-                own,
-            )
-        )
+        found.append((f"speed{i} disturbance, m/s", float(np.abs(np.diff(v) - period * a[:-1]).max()), own))
         if i > 1:
             ahead, before = col[f"speed{i - 1}_mps"], col[f"accel{i - 1}_mps2"]
             g = col[f"gap{i}_m"]
             error = np.diff(g) - period * (ahead - v)[:-1] - period**2 / 2 * (before - a)[:-1]
             row = model.plant.states.index(f"gap{i}_m")
-            found.append(
-                (
-                    f"gap{i} disturbance, m",
-                    float(np.abs(error).max()),
-                    float(model.plant.Ed[row, row]),
-                )
-            )
+            found.append((f"gap{i} disturbance, m", float(np.abs(error).max()), float(model.plant.Ed[row, row])))
     for s in model.signals:
         assert s.slew is not None
-        found.append(
-            (
-                f"{s.name} slew, a sample",
-                float(np.abs(np.diff(col[s.name])).max()) + 2 * s.noise,
-                s.slew[0],
-            )
-        )
-        found.append(
-            (
-                f"{s.name} range",
-                float(max(np.abs(col[s.name] - (s.low + s.high) / 2))) + s.noise,
-                (s.high - s.low) / 2,
-            )
-        )
+        found.append((f"{s.name} slew, a sample", float(np.abs(np.diff(col[s.name])).max()) + 2 * s.noise, s.slew[0]))
+        found.append((f"{s.name} range", float(max(np.abs(col[s.name] - (s.low + s.high) / 2))) + s.noise, (s.high - s.low) / 2))
     return found
 
 
@@ -131,11 +100,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("csv", nargs="?")
     parser.add_argument("--generated", action="store_true")
-    parser.add_argument(
-        "--misses",
-        default="build/openacc-misses.txt",
-        help="file that lists every missed fault SPEC",
-    )
+    parser.add_argument("--misses", default="build/openacc-misses.txt", help="file that lists every missed fault SPEC")
     args = parser.parse_args()
     made, _ = design(load_model("openacc"))
     native = Native(library("f32"), made.tables)
@@ -166,16 +131,7 @@ def main() -> int:
         if "disturbance" in what or value > bound:
             print(f"  {what}: {value:.5f} (model {bound:g})")
 
-    batch = Batch(
-        native,
-        made,
-        len(series),
-        REST,
-        seed=SEED,
-        start=MOVING,
-        series=series,
-        noise=True,
-    )
+    batch = Batch(native, made, len(series), REST, seed=SEED, start=MOVING, series=series, noise=True)
     result = batch.runs(0, 1)[0]
     trace = batch.trace(0)
     _, every, measured = periodic_bits(made, native, trace["reading"].tolist())
@@ -195,12 +151,7 @@ def main() -> int:
     starts = (last - FIRST) // STEP + 1
     last = FIRST + STEP * (starts - 1)
     faults = steps()
-    hit = table(
-        f"steps, from every start {FIRST}..{last} in steps of {STEP}, found within {WITHIN} samples:",
-        faults,
-        batch.sweep(faults, FIRST, STEP, starts, WITHIN + 1),
-        WITHIN,
-    )
+    hit = table(f"steps, from every start {FIRST}..{last} in steps of {STEP}, found within {WITHIN} samples:", faults, batch.sweep(faults, FIRST, STEP, starts, WITHIN + 1), WITHIN)
     missed = [str(FaultSpec(f.name, f.kind, f.size, FIRST + STEP * int(s), None)) for s, j in np.argwhere(~hit) for f in [faults[j]]]
     out = Path(args.misses)
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -210,12 +161,7 @@ def main() -> int:
         failures.append(f"{100 * hit.mean():.2f} % of the steps found, fewer than {100 * FOUND:.0f} %")
     creeping = slow()
     few = (len(series) - SLOW_WITHIN - FIRST - 2) // (10 * STEP) + 1
-    table(
-        f"slow faults, from {few} starts, found within {SLOW_WITHIN} samples (reported only):",
-        creeping,
-        batch.sweep(creeping, FIRST, STEP * 10, few, SLOW_WITHIN + 1),
-        SLOW_WITHIN,
-    )
+    table(f"slow faults, from {few} starts, found within {SLOW_WITHIN} samples (reported only):", creeping, batch.sweep(creeping, FIRST, STEP * 10, few, SLOW_WITHIN + 1), SLOW_WITHIN)
     for f in failures:
         print(f"FAILED: {f}")
     return 1 if failures else 0
