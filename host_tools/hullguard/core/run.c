@@ -75,7 +75,11 @@ static int64_t settling(const hg_detector_config *d)
 {
     int64_t longest = 0;
     for (uint8_t g = 0U; g < d->generators; g++) {
-        longest = (d->hull[g].ready_moving > longest) ? d->hull[g].ready_moving : longest;
+        const uint16_t ready = (d->hull != NULL) ? d->hull[g].ready_moving : d->zonotope[g].ready_moving;
+        longest = (ready > longest) ? ready : longest;
+    }
+    for (uint8_t b = 0U; b < d->banks; b++) {
+        longest = (d->bank[b].window > longest) ? d->bank[b].window : longest;
     }
     return longest;
 }
