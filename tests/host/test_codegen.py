@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from cantools.database.can import Database, Message
 from hullguard.codegen import emit_c, emit_dbc, write_all
-from hullguard.codegen.c import detector_reals, fill, real
+from hullguard.codegen.c import fill, real
 from hullguard.codegen.dbc import short
 from hullguard.design.design import Design, design
 from hullguard.design.tables import (
@@ -523,7 +523,7 @@ def expected_numbers(d: Design) -> Numbers:
     numbers += _each("decisions", len(t.generators))
     numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each("faults", tuple(e.faults for e in t.generators))
     numbers += _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("all_residuals", t.residuals)
-    numbers += _each("codes", 2 * t.signals) + [(tag, float(detector_reals(t))) for tag in ("reals", "needed", "stored")]
+    numbers += _each("codes", 2 * t.signals) + [(tag, float(t.reals)) for tag in ("reals", "needed", "stored")]
     numbers += _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
     return numbers + _each("heartbeat", t.heartbeat) + _each("hash", t.hash) + [("node", 1.0), ("null", 1.0), ("senders", 1.0), ("null", 1.0)]
 
