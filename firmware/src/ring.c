@@ -34,10 +34,21 @@ hg_status hg_ring_push(hg_ring *self, const hg_real *row)
     return HG_OK;
 }
 
+static uint16_t start_of(const hg_ring *self, uint8_t lag)
+{
+    const uint8_t row = (self->newest >= lag) ? (uint8_t)(self->newest - lag) : (uint8_t)((self->newest + self->length) - lag);
+    return (uint16_t)row * self->width;
+}
+
+hg_real *hg_ring_row(const hg_ring *self, uint8_t lag)
+{
+    return &self->data[start_of(self, lag)];
+}
+
 void hg_ring_rewrite(hg_ring *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *part)
 {
     if (lag < self->length) {
-        hg_real *row = hg_ring_row(self, lag);
+        hg_real *row = &self->data[start_of(self, lag)];
         for (uint8_t g = 0U; g < count; g++) {
             row[first + g] = part[g];
         }

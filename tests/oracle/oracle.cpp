@@ -337,23 +337,20 @@ State Decision::step(const Evidence &evidence)
         judge(i, evidence);
         worst = std::max(worst, judge_[i].state);
     }
+    for (size_t i = 0; i < judge_.size(); ++i) { proven_[i] = worst != State::none && (proven_[i] || judge_[i].state == State::confirmed); }
     return (worst == State::none && !evidence.ready) ? State::starting : worst;
 }
 
 std::uint32_t Decision::candidates() const
 {
-    for (const State said : {State::confirmed, State::provisional}) { /* only what is sure narrows what is sure */
-        bool          any    = false;
-        std::uint32_t common = 0xFFFFFFFFU;
-        for (size_t i = 0; i < judge_.size(); ++i) {
-            if (judge_[i].state == said) {
-                any = true;
-                common &= rules_.faults[i];
-            }
-        }
-        if (any) { return common; }
+    State worst = State::none;
+    for (const Judge &j : judge_) { worst = std::max(worst, j.state); }
+    if (worst == State::none) { return 0U; }
+    std::uint32_t common = 0xFFFFFFFFU;
+    for (size_t i = 0; i < judge_.size(); ++i) { /* only what is sure narrows what is sure, and it does so for the whole episode */
+        if (proven_[i] || judge_[i].state == worst) { common &= rules_.faults[i]; }
     }
-    return 0U;
+    return common;
 }
 
 } // namespace oracle

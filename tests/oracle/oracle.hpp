@@ -194,10 +194,14 @@ struct Evidence {
 
 class Decision {
 public:
-    explicit Decision(const Rules &rules) : rules_(rules), judge_(rules.feeds.size()) {}
+    explicit Decision(const Rules &rules) : rules_(rules), judge_(rules.feeds.size()), proven_(rules.feeds.size(), false) {}
     State         step(const Evidence &evidence);
     std::uint32_t candidates() const;
-    void          reset() { judge_.assign(judge_.size(), Judge{}); }
+    void          reset()
+    {
+        judge_.assign(judge_.size(), Judge{});
+        proven_.assign(proven_.size(), false);
+    }
 
 private:
     struct Judge {
@@ -210,6 +214,7 @@ private:
 
     const Rules       &rules_;
     std::vector<Judge> judge_;
+    std::vector<bool>  proven_; /* confirmed since the plant was last without an alarm, healed or not */
 };
 
 } // namespace oracle

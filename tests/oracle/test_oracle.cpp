@@ -1358,9 +1358,17 @@ void Chain::connect()
     expected_ = counter_;
     const auto signals = static_cast<std::uint8_t>(place_.size()), groups = static_cast<std::uint8_t>(groups_.size());
     const auto generators = static_cast<std::uint8_t>(observers_.size());
-    config_ = {signals, groups, hold_config_.data(), generators, residual_config_.data(), hull_config_.data(),
-               {generators, feeds_.data(), rules_.faults.data(), 1, static_cast<std::uint8_t>(rules_.down), false},
-               history, residuals, static_cast<std::uint16_t>(2 * signals), 0};
+    config_.signals    = signals;
+    config_.width      = signals; /* nothing is derived */
+    config_.groups     = groups;
+    config_.hold       = hold_config_.data();
+    config_.generators = generators;
+    config_.residual   = residual_config_.data();
+    config_.hull       = hull_config_.data();
+    config_.decision   = {generators, feeds_.data(), rules_.faults.data(), 1, static_cast<std::uint8_t>(rules_.down), false};
+    config_.history    = history;
+    config_.residuals  = residuals;
+    config_.codes      = static_cast<std::uint16_t>(2 * signals);
     config_.reals = hg_detector_reals(&config_);
     hold_memory_.resize(groups);
     residual_memory_.resize(generators);
@@ -1462,8 +1470,15 @@ std::string Chain::judge(int k)
 
 std::string Chain::run()
 {
-    const hg_detector_memory memory{hold_memory_.data(), residual_memory_.data(), hull_memory_.data(), alarm_memory_.data(), code_memory_.data(),
-                                    config_.codes, real_memory_.data(), config_.reals};
+    hg_detector_memory memory{};
+    memory.hold     = hold_memory_.data();
+    memory.residual = residual_memory_.data();
+    memory.hull     = hull_memory_.data();
+    memory.alarm    = alarm_memory_.data();
+    memory.code     = code_memory_.data();
+    memory.codes    = config_.codes;
+    memory.real     = real_memory_.data();
+    memory.reals    = config_.reals;
     if (hg_detector_start(&self_, &config_, &memory, rest_ ? HG_START_REST : HG_START_MOVING) != HG_OK) { return "start refused"; }
     std::string failure;
     for (int k = 0; k < samples_ && failure.empty(); ++k) {

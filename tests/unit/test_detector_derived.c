@@ -27,6 +27,7 @@
 #define DRIFT (0.0078125 + 0.03125 + 0.015625 + (0.25 * SM_HALF)) /* of the prediction in a sample */
 #define PREDICTED(j) (SM_HALF + ((double)(j) * DRIFT))
 #define HELD (0.25 + SM_HALF) /* what silence promises at level 0 */
+#define ACTIVE (0.0625 + SM_HALF) /* the same at level 1 */
 #define SLEW(j) ((0.25 * (double)(j)) + SM_HALF)
 
 static const uint8_t input_place[] = {2U};
@@ -99,7 +100,7 @@ typedef struct {
     hg_bank     bank[2];
     hg_alarm    alarm[4];
     int32_t     code[SM_CODES + 1U]; /* one more each, for the canary */
-    hg_real     real[REALS + 1U];
+    hg_real     real[REALS + 2U]; /* a test has a predictor with one input more */
     hg_acc      sum[SUMS + 1U];
 } storage;
 
@@ -248,9 +249,8 @@ static void sizes_that_contradict_one_another_are_refused(void **state)
     c[5].window = 0U;
     c[6].banks = 0U;       /* the decision counts three */
     c[7].decision.generators = 2U;
-    c[8].generators = 31U; /* 31 and 1 are 32: one less is counted below */
-    c[8].banks = 2U;
-    c[8].decision.generators = 33U;
+    c[8].generators = (uint8_t)HG_GENERATORS_MAX;
+    c[8].decision.generators = (uint8_t)(HG_GENERATORS_MAX + 1U);
     c[9].residuals = 2U;   /* one for each bank */
     c[10].history = WINDOW;
     c[11].mismatch = NULL; /* a place without a signal */
@@ -565,6 +565,32 @@ static void an_input_that_relies_on_silence_ends_the_prediction(void **state)
     assert_real(PREDICTED(2), r.self.radius[3]);
 }
 
+/* Inputs of both groups, the first of them known also while it is silent, as long as nothing can have been lost. */
+static void any_input_that_relies_on_silence_ends_the_prediction(void **state)
+{
+    (void)state;
+    const uint8_t places[] = {1U, 2U};
+    const hg_real widely[] = {R(HELD), R(SM_HALF)};
+    const hg_real drive_2[] = {R(0), R(0.25), R(0), R(0)};
+    hg_predict_config p[1] = {predict[0]};
+    p[0].inputs = 2U;
+    p[0].input = places;
+    p[0].known = widely;
+    p[0].drive = (hg_matrix){2U, 2U, 0, drive_2};
+    p[0].direct = (hg_matrix){2U, 2U, 0, zeros};
+    hg_detector_config c = usual;
+    c.predict = p;
+    c.reals = REALS + 1U;
+    rig r;
+    begin(&r, &c);
+    settle(&r);
+    (void)silent(&r, 0);
+    assert_real(PREDICTED(1), r.self.radius[3]);
+    (void)silent(&r, 0);
+    assert_real(HELD, r.self.radius[1]); /* no wider than before, but now it relies on silence */
+    assert_real(HELD, r.self.radius[3]);
+}
+
 static void a_code_marked_invalid_is_not_predicted(void **state)
 {
     (void)state;
@@ -576,7 +602,7 @@ static void a_code_marked_invalid_is_not_predicted(void **state)
     assert_real(SM_SPAN, r.self.radius[4]);
     assert_real(mismatch_of(0.0, SM_HALF, 0.0, SM_SPAN), r.self.radius[5]);
     (void)silent(&r, 0);
-    assert_real(SLEW(1), r.self.radius[3]);
+    assert_real(ACTIVE, r.self.radius[3]);
 }
 
 static void a_stale_group_ends_the_prediction(void **state)
@@ -608,12 +634,14 @@ static void restart_empties_windows_and_ends_predictions(void **state)
         }
     }
     assert_false(hg_bank_ready(&r.storage.bank[0]));
-    assert_int_equal(HG_PLANT_STARTING, silent(&r, 32));
-    assert_real(r.self.radius[0], r.self.radius[3]); /* what the holds know stays */
-    assert_int_equal(HG_PLANT_STARTING, sample(&r, 640, 0, 0));
-    assert_real(0.0, r.self.r[2]); /* no certificate sees the jump: the window began after it */
-    (void)sample(&r, 640, 0, 0);
+    assert_int_equal(HG_PLANT_STARTING, sample(&r, 640, 0, 0)); /* a jump in between is not the windows' business */
+    assert_int_equal(HG_PLANT_STARTING, silent(&r, 0));
+    assert_real(ACTIVE, r.self.radius[0]); /* what the holds know stays */
+    assert_real(ACTIVE, r.self.radius[3]);
+    assert_false(hg_bank_ready(&r.storage.bank[0]));
+    assert_int_equal(HG_PLANT_NONE, sample(&r, 640, 0, 0));
     assert_true(hg_bank_ready(&r.storage.bank[0]));
+    assert_real(0.0, r.self.r[2]);
 }
 
 static const hg_real bad_middle[] = {REAL_NAN, R(0)};
@@ -700,11 +728,13 @@ static void a_radius_that_is_not_finite_is_kept_as_the_largest_number(void **sta
     }
     give(&r, 0U, HG_CODE_INVALID, 0, true);
     give(&r, 1U, 0, 0, true);
-    assert_status(HG_E_NUMERIC, hg_detector_step(&r.self, &r.finding)); /* the bank's threshold is not finite */
-    assert_true(hg_bank_ready(&r.storage.bank[0]));
+    assert_int_equal(HG_PLANT_NONE, step(&r));
     assert_real(HG_REAL_MAX, past(&r, 0U, 0U));
+    assert_real(HG_REAL_MAX, past(&r, 0U, 3U));
     assert_real(SM_HALF, past(&r, 0U, 1U));
-    assert_int_equal(HG_PLANT_NONE, r.finding.plant);
+    (void)sample(&r, 0, 0, 0);
+    assert_real(HG_REAL_MAX, past(&r, 1U, 0U)); /* the sample is there, and where it belongs */
+    assert_real(SM_HALF, past(&r, 1U, 1U));
 }
 
 /* ---- alarms ---- */
@@ -716,19 +746,17 @@ static void a_lost_frame_takes_a_banks_alarm_back(void **state)
         rig r;
         begin(&r, &alone);
         for (uint32_t k = 0U; k < WINDOW; k++) {
-            (void)sample(&r, 0, 0, 32);
             (void)sample(&r, 0, 0, 0);
         }
-        /* s0 held at 0 for all its sender's silence, though u drives it away: a fault, or a frame was lost */
-        hg_detector_restart(&r.self, HG_START_REST);
-        (void)sample(&r, 0, 0, 40);
-        assert_int_equal(HG_PLANT_STARTING, silent(&r, 40));
-        assert_int_equal(HG_PLANT_NONE, silent(&r, 40)); /* 2 * 5/32 against HELD and more */
-        (void)silent(&r, 120);
-        assert_int_equal(HG_PLANT_NONE, r.finding.plant);
-        give(&r, 1U, 120, 0, true);
-        (void)step(&r);
-        (void)lost;
+        assert_int_equal(HG_PLANT_NONE, sample(&r, 0, 0, 64)); /* u = 1 drives s0 by 1/4 a sample */
+        assert_int_equal(HG_PLANT_NONE, silent(&r, 64));
+        assert_int_equal(HG_PLANT_PROVISIONAL, silent(&r, 64)); /* silence says that s0 has moved by less than 1/2 */
+        assert_int_equal(0x9, r.finding.candidates);
+        assert_real(-0.5, r.self.r[0]);
+        give(&r, 0U, 48, 0, lost == 0);
+        give(&r, 1U, 64, 0, true);
+        assert_int_equal((lost == 0) ? HG_PLANT_CONFIRMED : HG_PLANT_NONE, step(&r));
+        assert_int_equal((lost == 0) ? 0x9 : 0, r.finding.candidates);
     }
 }
 
@@ -764,5 +792,163 @@ static void a_rewind_longer_than_the_ring_ends_with_it(void **state)
     assert_real(SLEW(4), past(&r, 0U, 0U));
     assert_real(SLEW(3), past(&r, 1U, 0U));
     assert_real(SLEW(2), past(&r, 2U, 0U));
+    assert_real(mismatch_of(0.0, SM_HALF, 0.0, SLEW(4)), past(&r, 0U, 3U)); /* not taken for the row behind the oldest */
     assert_real(mismatch_of(0.0, SM_HALF, 0.0, SLEW(2)), past(&r, 2U, 3U));
+}
+
+/* ---- the claim ---- */
+
+/* The plant of the header within its bounds, mostly at their ends. */
+typedef struct {
+    double x;
+    double s1;
+    double u;
+    double goal; /* of u */
+    double push[3];
+} plant;
+
+static void plant_move(plant *p, uint32_t *random)
+{
+    const double w = (p->push[0] / 128.0) + (p->push[1] * fabs(p->u) / 16.0) + (p->push[2] * fabs(p->s1) / 512.0);
+    p->x += (0.25 * p->u) + w;
+    for (size_t i = 0U; i < 3U; i++) {
+        if ((draw(random) % 10U) == 0U) {
+            p->push[i] = (double)draw_between(random, -1, 1);
+        }
+    }
+    const double move = (double)draw_between(random, -16, 16) / 64.0;
+    p->s1 += (fabs(p->s1 + move) <= 7.0) ? move : 0.0;
+    if ((draw(random) % 12U) == 0U) {
+        p->goal = (double)draw_between(random, -29, 29) / 64.0;
+    }
+    if (fabs(p->x) > 30.0) {
+        p->goal = (p->x > 0.0) ? -0.25 : 0.25;
+    }
+    p->u += fmax(-0.25, fmin(0.25, p->goal - p->u));
+}
+
+typedef struct {
+    hg_trigger trigger;
+    int32_t    codes[2];
+    uint8_t    group;
+    uint32_t   counter;
+    uint32_t   last;
+} sender;
+
+static void send(rig *r, sender *s, const int32_t *code, int32_t loss, uint32_t *random)
+{
+    if (hg_trigger_step(&s->trigger, code) == HG_OK) {
+        s->counter++;
+        if (draw_between(random, 0, 99) >= loss) {
+            give(r, s->group, code[0], code[1], (s->counter - s->last) == 1U);
+            s->last = s->counter;
+        } else if ((draw(random) % 3U) == 0U) {
+            assert_status(HG_OK, hg_detector_lose(&r->self, s->group));
+        } else {
+            /* nobody knows yet */
+        }
+    }
+}
+
+/* What a run saw. */
+typedef struct {
+    unsigned provisional;
+    unsigned predicted;
+    int      confirmed_at;
+} seen;
+
+static void run_plant(const hg_detector_config *config, int32_t loss, uint32_t *random, seen *all)
+{
+    rig r;
+    plant p = {.x = 3.0, .s1 = -2.0};
+    sender outputs = {.group = 0U};
+    sender input = {.group = 1U};
+    begin(&r, config);
+    assert_status(HG_OK, hg_trigger_start(&outputs.trigger, config->hold[0].trigger, outputs.codes));
+    assert_status(HG_OK, hg_trigger_start(&input.trigger, config->hold[1].trigger, input.codes));
+    all->confirmed_at = -1;
+    for (int k = 0; k < 1000; k++) {
+        const bool fault = k >= 900;
+        const double wrong = (fault && (((k / 5) % 2) == 0)) ? 4.0 : 0.0;
+        const int32_t a[2] = {hg_code_encode(&sm_scale[0], R(p.x + wrong)), hg_code_encode(&sm_scale[1], R(p.s1))};
+        const int32_t b[2] = {hg_code_encode(&sm_scale[0], R(p.u)), 0};
+        send(&r, &outputs, a, loss, random);
+        send(&r, &input, b, loss / 3, random);
+        const hg_plant found = step(&r);
+        if (!fault && (found == HG_PLANT_CONFIRMED)) {
+            print_error("sample %d: confirmed without a fault\n", k);
+            fail();
+        }
+        all->provisional += ((!fault) && (found == HG_PLANT_PROVISIONAL)) ? 1U : 0U;
+        if ((!fault) && (config->predictors > 0U) && (r.self.radius[3] < r.self.radius[0])) {
+            all->predicted++; /* true whatever was lost */
+            assert_true(fabs(p.x - (double)r.self.value[3]) <= (double)r.self.radius[3]);
+        }
+        if (fault && (found == HG_PLANT_CONFIRMED) && (all->confirmed_at < 0)) {
+            all->confirmed_at = k;
+            assert_true((r.finding.candidates & 1U) != 0U);
+        }
+        plant_move(&p, random);
+    }
+}
+
+/* The claim of the library: within the bounds no alarm is ever confirmed, whatever the link loses; and a fault is. */
+static void no_false_alarm_is_confirmed_whatever_is_lost(void **state)
+{
+    (void)state;
+    uint32_t random = seed_of_run(52U);
+    hg_trigger_config slow = sm_trigger_b; /* an input that is sent when its code changes, or every fourth sample */
+    slow.interval_max = 4U;
+    hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
+    hold[1].trigger = &slow;
+    hold[1].margin = 0U;
+    hg_predict_config at_once[1] = {predict[0]};
+    at_once[0].settle = 0U; /* a frame tells all of x here, and inputs are seldom known for long */
+    hg_detector_config by_events = usual;
+    by_events.hold = hold;
+    by_events.predict = at_once;
+    const hg_detector_config *configs[] = {&usual, &by_events, &alone};
+    for (size_t i = 0U; i < COUNT(configs); i++) {
+        seen all = {.provisional = 0U, .predicted = 0U, .confirmed_at = -1};
+        for (int run = 0; run < 40; run++) {
+            run_plant(configs[i], (run % 4) * 12, &random, &all);
+            assert_true(all.confirmed_at >= 900);
+            assert_true(all.confirmed_at < 960);
+        }
+        print_message("%u provisional alarms, %u predictions\n", all.provisional, all.predicted);
+        assert_true(all.provisional > 0U); /* losses did raise alarms that had to be taken back */
+        assert_int_equal(configs[i]->predictors > 0U, all.predicted > 500U);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(missing_memory_is_refused),
+        cmocka_unit_test(memory_one_too_short_is_refused),
+        cmocka_unit_test(sizes_that_contradict_one_another_are_refused),
+        cmocka_unit_test(a_vector_wider_than_its_signals_is_refused),
+        cmocka_unit_test(contradicting_predictors_are_refused),
+        cmocka_unit_test(a_contradicting_mismatch_is_refused),
+        cmocka_unit_test(contradicting_banks_are_refused),
+        cmocka_unit_test(samples_compute_by_hand),
+        cmocka_unit_test(silence_is_predicted),
+        cmocka_unit_test(a_rewind_widens_what_was_derived),
+        cmocka_unit_test(a_prediction_that_is_wider_than_what_was_lost_stays),
+        cmocka_unit_test(a_rewind_of_another_group_grows_the_mismatch_alone),
+        cmocka_unit_test(a_missing_input_ends_the_prediction),
+        cmocka_unit_test(an_input_that_relies_on_silence_ends_the_prediction),
+        cmocka_unit_test(any_input_that_relies_on_silence_ends_the_prediction),
+        cmocka_unit_test(a_code_marked_invalid_is_not_predicted),
+        cmocka_unit_test(a_stale_group_ends_the_prediction),
+        cmocka_unit_test(restart_empties_windows_and_ends_predictions),
+        cmocka_unit_test(a_number_that_is_not_finite_empties_the_windows),
+        cmocka_unit_test(a_value_that_the_mismatch_cannot_bound_spoils_no_other_radius),
+        cmocka_unit_test(a_radius_that_is_not_finite_is_kept_as_the_largest_number),
+        cmocka_unit_test(a_lost_frame_takes_a_banks_alarm_back),
+        cmocka_unit_test(candidates_are_narrowed_by_the_bank_for_the_episode),
+        cmocka_unit_test(a_rewind_longer_than_the_ring_ends_with_it),
+        cmocka_unit_test(no_false_alarm_is_confirmed_whatever_is_lost),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }

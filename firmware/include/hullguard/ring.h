@@ -41,10 +41,6 @@ hg_status hg_ring_push(hg_ring *self, const hg_real *row);
 void hg_ring_rewrite(hg_ring *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *part);
 
 /** The sample `lag` before the newest. @param[in] lag  0 .. length - 1  Result: [width]. Constant time. */
-static inline hg_real *hg_ring_row(const hg_ring *self, uint8_t lag)
-{
-    const uint16_t row = (self->newest >= lag) ? ((uint16_t)self->newest - lag) : (((uint16_t)self->newest + self->length) - lag);
-    return &self->data[(uint32_t)row * self->width];
-}
+hg_real *hg_ring_row(const hg_ring *self, uint8_t lag);
 
 #endif
