@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from hullguard.model.table import Array
 
 RANK_TOLERANCE = 1e-10  # of |T|_F, absolute: a default tolerance loses W in one design of eleven
 POLISH_STEPS = 3  # of Newton's method behind scipy's solution
+FORGOTTEN = 1e-6  # what is left of an error of X when the polish ends
+SETTLE_STEPS = 3000  # of the recursion, at most
 NEWTON_STEPS = 60  # from Lo = 0
 DOUBLINGS = 40
 
@@ -186,19 +189,30 @@ def polished(G: Array, W: Array, Eb: Array, Fb: Array, epsilon: float) -> PostFi
             raise np.linalg.LinAlgError("scipy's solution is not the stabilising one")
     except (np.linalg.LinAlgError, ValueError):
         Lo, steps = np.zeros((G.shape[0], W.shape[0])), NEWTON_STEPS
-    rows = W.shape[0]
-    Z = root = np.zeros((0, 0))
+    Z = np.zeros((0, 0))
     for _ in range(steps):
         Z = _lyapunov_factor(G - Lo @ W, Eb - Lo @ Fb)
-        low = _triangle(np.vstack([np.hstack([W @ Z, Fb]), np.hstack([G @ Z, Eb])]))
-        root = low[:rows, :rows]  # root root' = S
-        before, Lo = Lo, np.asarray(np.linalg.solve(root.T, low[rows:, :rows].T).T)
-        if np.abs(Lo - before).max() <= 1e-15 * np.abs(Lo).max():
+        before, (root, Lo, _) = Lo, _riccati_step(G, W, Eb, Fb, Z)
+        if np.abs(Lo - before).max() <= 1e-12 * np.abs(Lo).max():
             break
+    # Newton's steps wander by what squaring G - Lo W loses in companion coordinates; the recursion itself forgets it as the filter forgets.
+    forgets = float(np.abs(np.linalg.eigvals(G - Lo @ W)).max())
+    if forgets >= 1.0:
+        raise np.linalg.LinAlgError("no stabilising solution: disturbances leave a mode on the unit circle unmoved")
+    for _ in range(min(SETTLE_STEPS, math.ceil(math.log(FORGOTTEN) / (2 * math.log(max(forgets, 1e-3)))))):
+        root, Lo, Z = _riccati_step(G, W, Eb, Fb, Z)
     U, sigma, _ = np.linalg.svd(root)
     if sigma[-1] <= 0.0:
         raise np.linalg.LinAlgError("S is not positive definite")
     return PostFilter(Lo, U @ np.diag(1.0 / sigma) @ U.T, Z @ Z.T, root @ root.T, Eb, Fb, epsilon)
+
+
+def _riccati_step(G: Array, W: Array, Eb: Array, Fb: Array, Z: Array) -> tuple[Array, Array, Array]:
+    """One step of the Riccati recursion on the factor: root of S, Lo, and the next Z."""
+    rows = W.shape[0]
+    low = _triangle(np.vstack([np.hstack([W @ Z, Fb]), np.hstack([G @ Z, Eb])]))
+    root = low[:rows, :rows]  # root root' = S
+    return root, np.asarray(np.linalg.solve(root.T, low[rows:, :rows].T).T), low[rows:, rows:]
 
 
 def _triangle(a: Array) -> Array:

@@ -39,6 +39,7 @@ SETTLED = 1e-8
 FAR = 0.01  # of its length: how far a chosen parity vector may be from the null space
 NOTHING = 1e3  # cost where there is no generator; more than any that there is
 INVISIBLE = 1e6  # size of a fault that never shows, for the cost
+OTHERS = 0.05  # weight of the mean over all faults beside the hardest one
 
 
 @dataclass(frozen=True)
@@ -276,9 +277,11 @@ class Problem:
         if not self.paths:
             return 0.0, smallest
         setting: Search = self.spec.search
-        asked = delays(ratios, setting.size).mean() if setting.objective == "delay" else smallest.max()
-        # The logarithm: a scale that the unit of a fault does not change.
-        return math.log(min(max(float(asked), 1.0 / INVISIBLE), INVISIBLE)), smallest
+        if setting.objective == "delay":
+            return math.log(max(float(delays(ratios, setting.size).mean()), 1.0 / INVISIBLE)), smallest
+        # Logarithms, so that a fault's unit changes nothing but a constant. Where the hardest fault stays the same the others decide.
+        hard = np.log(np.clip(smallest, 1.0 / INVISIBLE, INVISIBLE))
+        return float(hard.max() + OTHERS * hard.mean()), smallest
 
 
 class _SpentError(Exception):
