@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -13,6 +13,7 @@ from hullguard.errors import InputError
 from hullguard.model.table import Array
 
 RANK_TOLERANCE = 1e-10  # of |T|_F, absolute: a default tolerance loses W in one design of eleven
+BASIS_LEAST = 1e-3  # length of a projected unit vector that is worth a row of W
 POLISH_STEPS = 3  # of Newton's method behind scipy's solution
 FORGOTTEN = 1e-6  # what is left of an error of X when the polish ends
 SETTLE_STEPS = 3000  # of the recursion, at most
@@ -96,6 +97,21 @@ def structure(plant: SubPlant, v: Array, gamma: Array) -> tuple[Array, Array, Ar
     return G, mul(T, plant.B) - mul(L, plant.D), L, T
 
 
+def _canonical(N: Array) -> Array:
+    """Rows of the one orthonormal basis of the span of N's columns that depends on the span alone: unit vectors projected, the last one first.
+
+    LAPACK's basis turns with the last bits of its input, and Mo = S^(-1/2) and each single residual with it. e_s itself is in the span.
+    """
+    chosen: list[Array] = []
+    for j in reversed(range(N.shape[0])):
+        row = N @ N[j]
+        for other in chosen:
+            row = row - other * (other @ row)
+        if len(chosen) < N.shape[1] and np.linalg.norm(row) > BASIS_LEAST:
+            chosen.append(row / np.linalg.norm(row))
+    return np.array(chosen[::-1]) if len(chosen) == N.shape[1] else N.T
+
+
 def output_map(plant: SubPlant, T: Array) -> tuple[Array, Array]:
     """All of W (rows span the left null space of T C_perp) and V = W T C'(C C')^-1."""
     s = T.shape[0]
@@ -105,7 +121,7 @@ def output_map(plant: SubPlant, T: Array) -> tuple[Array, Array]:
     else:
         U, sigma, _ = np.linalg.svd(T @ perp)
         rank = int(np.sum(sigma > RANK_TOLERANCE * np.linalg.norm(T)))
-        W = U[:, rank:].T
+        W = _canonical(U[:, rank:])
     return W, W @ T @ plant.C.T @ np.linalg.inv(plant.C @ plant.C.T)
 
 
@@ -138,6 +154,14 @@ def _disturbed(plant: SubPlant, L: Array, H: Array, T: Array, V: Array, Qu: Arra
         Eb = np.hstack([Eb, -L * plant.Sy, -H * plant.Su])
         Fb = np.hstack([Fb, V * plant.Sy, -Qu * plant.Su])
     return Eb, Fb
+
+
+def weighted(plant: SubPlant, weight: float) -> SubPlant:
+    """The plant as its post-filter is to see it: `weight` times the expected event error.
+
+    1 is best for random errors; a hull adds up absolute values, and with more the filter averages longer: smaller faults show.
+    """
+    return replace(plant, Sy=weight * plant.Sy, Su=weight * plant.Su)
 
 
 def disturbance_rank(plant: SubPlant, G: Array, H: Array, L: Array, T: Array, W: Array, V: Array, aware: bool) -> int:

@@ -157,6 +157,7 @@ def _times(axes: Sequence[Axes]) -> None:
 
 
 def heading(ax: Axes, text: str, more: str = "", color: str = MUTED) -> None:
+    """A panel's name above its left end, and a remark above its right one."""
     ax.text(0.0, 1.0, text, transform=_above(ax), ha="left", va="bottom", fontweight="bold")
     if more:
         ax.text(1.0, 1.0, more, transform=_above(ax), ha="right", va="bottom", color=color)
