@@ -126,15 +126,15 @@ def test_residuals_do_not_depend_on_the_state_of_a_healthy_plant(every: list[Cas
     for c in every[::7]:
         p = c.plant
         state, inputs, output, direct = fused(c.observer, c.filter)
-        x = rng.standard_normal(p.A.shape[0])
-        z = c.observer.T @ x
-        scale = np.abs(output).max() * (1 + np.abs(z).max()) + np.abs(direct).max()
+        x: Array = np.asarray(rng.standard_normal(p.A.shape[0]))
+        z: Array = np.asarray(c.observer.T @ x)
+        scale = float(np.abs(output).max() * (1 + np.abs(z).max()) + np.abs(direct).max())
         for _ in range(20):
             u = rng.standard_normal(p.B.shape[1])
             v = np.concatenate([p.C @ x + p.D @ u, u])
             scale = max(scale, float(np.abs(output).max() * np.abs(z).max() + np.abs(direct).max() * np.abs(v).max()))
             assert np.abs(output @ z + direct @ v).max() <= 1e-9 * scale
-            z, x = state @ z + inputs @ v, p.A @ x + p.B @ u
+            z, x = state @ z + inputs @ v, np.asarray(p.A @ x + p.B @ u)
 
 
 def test_one_inverse_is_the_product_of_the_two_transfer_functions(models: Models) -> None:
