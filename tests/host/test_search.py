@@ -49,7 +49,10 @@ class Task:
                 v = centre + step * np.linalg.norm(centre) / np.linalg.norm(v) * v
                 p = np.clip(poles + 0.2 * step * rng.standard_normal(4), 0.0, 0.9)
                 step = max(step * 0.995, 0.01)
-            o, f = make(self.plant, v.reshape(5, 3), gamma_of(p), 2, self.paths, True, quick=True)
+            try:
+                o, f = make(self.plant, v.reshape(5, 3), gamma_of(p), 2, self.paths, True, quick=True)
+            except (np.linalg.LinAlgError, ValueError):
+                continue
             found = float(smallest_faults(self.plant, o, f, self.paths, self.radius).max())
             if found < best:
                 best, centre, poles = found, v, p
