@@ -108,7 +108,7 @@ def emit(args: argparse.Namespace, result: dict[str, Any]) -> None:
 def matrices(made: Design) -> list[dict[str, Any]]:
     """Matrices of every generator by the names of the method note."""
     rows = []
-    for g in made.generators:
+    for g, found in zip(made.generators, made.stored.observers, strict=True):
         named = {
             "A": g.plant.A, "B": g.plant.B, "C": g.plant.C, "D": g.plant.D, "Ed": g.plant.Ed, "Fd": g.plant.Fd,
             "T": g.observer.T, "G": g.observer.G, "H": g.observer.H, "L": g.observer.L, "W": g.observer.W, "V": g.observer.V, "Qu": g.observer.Qu,
@@ -122,6 +122,7 @@ def matrices(made: Design) -> list[dict[str, Any]]:
         row["smallest_fault_first_draw"] = _by_fault(made, g.spec.faults, g.first)
         row["delay"] = {"size": g.spec.search.size, "samples": _by_fault(made, g.spec.faults, g.delay)}
         row["smallest_fault_without_trigger_aware_filter"] = _by_fault(made, g.spec.faults, g.blind)
+        row["event_weight"] = found.weight
         row["regularised"] = g.filter.regularised
         row["rounding"] = g.tables.rounding.tolist()
         row["threshold_steady"] = g.tables.steady.tolist()

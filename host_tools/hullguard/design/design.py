@@ -15,7 +15,7 @@ from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
-from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure
+from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure, weighted
 from hullguard.design.predict import Bounds, predict_table, predicted_groups
 from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
@@ -186,7 +186,7 @@ def _found(model: Model, i: int, radius: Array, tick: Tick) -> StoredObserver:
     else:
         best = between_events(sub, spec.order, paths, *_spoken(model, spec))
     o, f = best.observer, best.filter
-    return StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6), digits(best.first, 6))
+    return StoredObserver(o.v, o.gamma, o.W, o.V, digits(f.Lo), digits(f.Mo), f.regularised, digits(best.smallest, 6), digits(best.first, 6), best.weight)
 
 
 def refilter(model: Model, old: Stored) -> Stored:
@@ -206,7 +206,7 @@ def refilter(model: Model, old: Stored) -> Stored:
             observers.append(stored)
             continue
         Qu = stored.V @ sub.D
-        f = post_filter(sub, G, L, H, T, stored.W, stored.V, Qu, spec.aware)
+        f = post_filter(weighted(sub, stored.weight), G, L, H, T, stored.W, stored.V, Qu, spec.aware)
         o = ObserverMatrices(stored.v, stored.gamma, G, H, L, T, stored.W, stored.V, Qu)
         paths = fault_paths(model, spec, spec.faults)
         smallest = smallest_faults(sub, o, f, paths, np.concatenate([sub.Sy, sub.Su]))
@@ -317,7 +317,7 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     sub = sub_plant(model, spec, radius)
     G, H, L, T = structure(sub, found.v, found.gamma)
     o = ObserverMatrices(found.v, found.gamma, G, H, L, T, found.W, found.V, found.V @ sub.D)
-    solved = post_filter(bounded, G, L, H, T, found.W, found.V, o.Qu, spec.aware) if spec.filtered else no_filter(spec.order)
+    solved = post_filter(weighted(bounded, found.weight), G, L, H, T, found.W, found.V, o.Qu, spec.aware) if spec.filtered else no_filter(spec.order)
     f = replace(solved, Lo=found.Lo, Mo=found.Mo)
     linear = hull.rounded(*fused(o, f))
     plant = model.plant

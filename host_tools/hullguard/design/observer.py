@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -12,7 +13,10 @@ from hullguard.errors import InputError
 from hullguard.model.table import Array
 
 RANK_TOLERANCE = 1e-10  # of |T|_F, absolute: a default tolerance loses W in one design of eleven
+BASIS_LEAST = 1e-3  # length of a projected unit vector that is worth a row of W
 POLISH_STEPS = 3  # of Newton's method behind scipy's solution
+FORGOTTEN = 1e-6  # what is left of an error of X when the polish ends
+SETTLE_STEPS = 3000  # of the recursion, at most
 NEWTON_STEPS = 60  # from Lo = 0
 DOUBLINGS = 40
 
@@ -93,6 +97,21 @@ def structure(plant: SubPlant, v: Array, gamma: Array) -> tuple[Array, Array, Ar
     return G, mul(T, plant.B) - mul(L, plant.D), L, T
 
 
+def _canonical(N: Array) -> Array:
+    """Rows of the one orthonormal basis of the span of N's columns that depends on the span alone: unit vectors projected, the last one first.
+
+    LAPACK's basis turns with the last bits of its input, and Mo = S^(-1/2) and each single residual with it. e_s itself is in the span.
+    """
+    chosen: list[Array] = []
+    for j in reversed(range(N.shape[0])):
+        row = N @ N[j]
+        for other in chosen:
+            row = row - other * (other @ row)
+        if len(chosen) < N.shape[1] and np.linalg.norm(row) > BASIS_LEAST:
+            chosen.append(row / np.linalg.norm(row))
+    return np.array(chosen[::-1]) if len(chosen) == N.shape[1] else N.T
+
+
 def output_map(plant: SubPlant, T: Array) -> tuple[Array, Array]:
     """All of W (rows span the left null space of T C_perp) and V = W T C'(C C')^-1."""
     s = T.shape[0]
@@ -102,7 +121,7 @@ def output_map(plant: SubPlant, T: Array) -> tuple[Array, Array]:
     else:
         U, sigma, _ = np.linalg.svd(T @ perp)
         rank = int(np.sum(sigma > RANK_TOLERANCE * np.linalg.norm(T)))
-        W = U[:, rank:].T
+        W = _canonical(U[:, rank:])
     return W, W @ T @ plant.C.T @ np.linalg.inv(plant.C @ plant.C.T)
 
 
@@ -135,6 +154,14 @@ def _disturbed(plant: SubPlant, L: Array, H: Array, T: Array, V: Array, Qu: Arra
         Eb = np.hstack([Eb, -L * plant.Sy, -H * plant.Su])
         Fb = np.hstack([Fb, V * plant.Sy, -Qu * plant.Su])
     return Eb, Fb
+
+
+def weighted(plant: SubPlant, weight: float) -> SubPlant:
+    """The plant as its post-filter is to see it: `weight` times the expected event error.
+
+    1 is best for random errors; a hull adds up absolute values, and with more the filter averages longer: smaller faults show.
+    """
+    return replace(plant, Sy=weight * plant.Sy, Su=weight * plant.Su)
 
 
 def disturbance_rank(plant: SubPlant, G: Array, H: Array, L: Array, T: Array, W: Array, V: Array, aware: bool) -> int:
@@ -186,19 +213,30 @@ def polished(G: Array, W: Array, Eb: Array, Fb: Array, epsilon: float) -> PostFi
             raise np.linalg.LinAlgError("scipy's solution is not the stabilising one")
     except (np.linalg.LinAlgError, ValueError):
         Lo, steps = np.zeros((G.shape[0], W.shape[0])), NEWTON_STEPS
-    rows = W.shape[0]
-    Z = root = np.zeros((0, 0))
+    Z = np.zeros((0, 0))
     for _ in range(steps):
         Z = _lyapunov_factor(G - Lo @ W, Eb - Lo @ Fb)
-        low = _triangle(np.vstack([np.hstack([W @ Z, Fb]), np.hstack([G @ Z, Eb])]))
-        root = low[:rows, :rows]  # root root' = S
-        before, Lo = Lo, np.asarray(np.linalg.solve(root.T, low[rows:, :rows].T).T)
-        if np.abs(Lo - before).max() <= 1e-15 * np.abs(Lo).max():
+        before, (root, Lo, _) = Lo, _riccati_step(G, W, Eb, Fb, Z)
+        if np.abs(Lo - before).max() <= 1e-12 * np.abs(Lo).max():
             break
+    # Newton's steps wander by what squaring G - Lo W loses in companion coordinates; the recursion itself forgets it as the filter forgets.
+    forgets = float(np.abs(np.linalg.eigvals(G - Lo @ W)).max())
+    if forgets >= 1.0:
+        raise np.linalg.LinAlgError("no stabilising solution: disturbances leave a mode on the unit circle unmoved")
+    for _ in range(min(SETTLE_STEPS, math.ceil(math.log(FORGOTTEN) / (2 * math.log(max(forgets, 1e-3)))))):
+        root, Lo, Z = _riccati_step(G, W, Eb, Fb, Z)
     U, sigma, _ = np.linalg.svd(root)
     if sigma[-1] <= 0.0:
         raise np.linalg.LinAlgError("S is not positive definite")
     return PostFilter(Lo, U @ np.diag(1.0 / sigma) @ U.T, Z @ Z.T, root @ root.T, Eb, Fb, epsilon)
+
+
+def _riccati_step(G: Array, W: Array, Eb: Array, Fb: Array, Z: Array) -> tuple[Array, Array, Array]:
+    """One step of the Riccati recursion on the factor: root of S, Lo, and the next Z."""
+    rows = W.shape[0]
+    low = _triangle(np.vstack([np.hstack([W @ Z, Fb]), np.hstack([G @ Z, Eb])]))
+    root = low[:rows, :rows]  # root root' = S
+    return root, np.asarray(np.linalg.solve(root.T, low[rows:, :rows].T).T), low[rows:, rows:]
 
 
 def _triangle(a: Array) -> Array:

@@ -2,7 +2,8 @@
 
 Poles matter only where W has more rows than residuals are kept: G = G0 + gamma e_s' and L = L0 - gamma v_s feed r0_s = v_s y - z_s back,
 which is a combination of r0, and the optimal post-filter undoes every such M(z) with M and its inverse stable and M(infinity) = I. Then all
-poles give the same r, and the search leaves them at 0.
+poles give the same r, and the search leaves them at 0. What does matter is how much of the event error a trigger-aware post-filter is
+told: with a larger weight smaller faults show, after more samples.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from hullguard.design.observer import (
     parity_basis,
     post_filter,
     structure,
+    weighted,
 )
 from hullguard.errors import InputError
 from hullguard.model.schema import Observer, Search
@@ -39,6 +41,7 @@ SETTLED = 1e-8
 FAR = 0.01  # of its length: how far a chosen parity vector may be from the null space
 NOTHING = 1e3  # cost where there is no generator; more than any that there is
 INVISIBLE = 1e6  # size of a fault that never shows, for the cost
+OTHERS = 0.05  # weight of the mean over all faults beside the hardest one
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,7 @@ class Candidate:
     filter: PostFilter
     smallest: Array  # faults: size whose response reaches the threshold, inf where it never does
     first: Array  # faults: the same of the first point that the search drew, NaN where there was no search
+    weight: float = 1.0  # of the event error in the post-filter
 
 
 def make(plant: SubPlant, v: Array, gamma: Array, residuals: int, paths: list[FaultPath], aware: bool, quick: bool = False) -> tuple[ObserverMatrices, PostFilter]:
@@ -237,7 +241,9 @@ class Problem:
             v = project(plant, np.array(spec.parity), where)
             self._basis, self.free_parity = v.reshape(1, -1) / np.linalg.norm(v), 0
         self.free_poles = order if spec.poles is None and self._poles_matter() else 0
-        self.size = self.free_parity + self.free_poles
+        low, high = spec.search.event_weight
+        self.free_weight = int(spec.aware and low < high and not spec.chosen)
+        self.size = self.free_parity + self.free_poles + self.free_weight
 
     def _poles_matter(self) -> bool:
         """Whether W has more rows than are kept."""
@@ -256,14 +262,20 @@ class Problem:
         if self.spec.poles is not None:
             poles = np.array(self.spec.poles[: self.order])
         elif self.free_poles:
-            poles = poles_from(x[self.free_parity :], *self.spec.search.poles)
+            poles = poles_from(x[self.free_parity :][: self.free_poles], *self.spec.search.poles)
         else:
             poles = np.zeros(self.order)
         return (v / np.linalg.norm(v)).reshape(self._shape), gamma_of(poles)
 
+    def weight(self, x: Array) -> float:
+        """Weight of the event error in the post-filter."""
+        low, high = (math.log(w) for w in self.spec.search.event_weight)
+        share = (1.0 + math.tanh(x[-1])) / 2 if self.free_weight else 0.0
+        return float(f"{math.exp(low + share * (high - low)):.6g}")
+
     def made(self, x: Array, quick: bool) -> tuple[ObserverMatrices, PostFilter]:
         """Observer and post-filter of a point."""
-        return make(self.plant, *self.parameters(x), self.spec.residuals, self.paths, self.spec.aware, quick)
+        return make(weighted(self.plant, self.weight(x)), *self.parameters(x), self.spec.residuals, self.paths, self.spec.aware, quick)
 
     def cost(self, x: Array) -> tuple[float, Array]:
         """What the search makes small, and the smallest faults."""
@@ -276,9 +288,11 @@ class Problem:
         if not self.paths:
             return 0.0, smallest
         setting: Search = self.spec.search
-        asked = delays(ratios, setting.size).mean() if setting.objective == "delay" else smallest.max()
-        # The logarithm: a scale that the unit of a fault does not change.
-        return math.log(min(max(float(asked), 1.0 / INVISIBLE), INVISIBLE)), smallest
+        if setting.objective == "delay":
+            return math.log(max(float(delays(ratios, setting.size).mean()), 1.0 / INVISIBLE)), smallest
+        # Logarithms, so that a fault's unit changes nothing but a constant. Where the hardest fault stays the same the others decide.
+        hard = np.log(np.clip(smallest, 1.0 / INVISIBLE, INVISIBLE))
+        return float(hard.max() + OTHERS * hard.mean()), smallest
 
 
 class _SpentError(Exception):
@@ -336,7 +350,7 @@ class _Trials:
 def search(plant: SubPlant, spec: Observer, paths: list[FaultPath], radius: Array, where: str, tick: Callable[[int, int], None]) -> Candidate:
     """The best generator within the budget of trials; half of it chooses the order where there is a choice. The same seed gives the same result on one machine."""
     orders = [s for s in range(spec.order, spec.order_max + 1) if parity_basis(plant, s).size]
-    rng, budget, done = np.random.default_rng(spec.search.seed), max(spec.search.trials, 2 * len(orders)), 0
+    rng, budget, done = np.random.default_rng(spec.search.seed), spec.search.trials if len(orders) == 1 else max(spec.search.trials, 2 * len(orders)), 0
 
     def step() -> None:
         nonlocal done
@@ -357,4 +371,4 @@ def search(plant: SubPlant, spec: Observer, paths: list[FaultPath], radius: Arra
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(f"{where}: the post-filter of the best generator cannot be solved ({error}); another seed, other poles or another order may do") from error
     first = next(t.first for t in trials if t.best is not None) if best.problem.size else np.full(len(paths), np.nan)
-    return Candidate(o, f, smallest_faults(plant, o, f, paths, radius), first)
+    return Candidate(o, f, smallest_faults(plant, o, f, paths, radius), first, best.problem.weight(best.best))

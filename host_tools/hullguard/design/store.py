@@ -31,6 +31,7 @@ class StoredObserver:
     regularised: float
     smallest: Array
     first: Array  # smallest faults of the search's first draw, NaN where nothing was searched for
+    weight: float  # of the event error in the post-filter
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ def write(path: Path, name: str, stored: Stored) -> None:
                 "regularised": o.regularised,
                 "smallest_fault": [float(x) if np.isfinite(x) else -1.0 for x in o.smallest],
             }
+            | ({} if o.weight == 1.0 else {"event_weight": o.weight})
             | ({} if np.isnan(o.first).any() else {"smallest_fault_first_draw": [float(x) if np.isfinite(x) else -1.0 for x in o.first]})
             for o in stored.observers
         ],
@@ -131,6 +133,7 @@ def read(path: Path) -> Stored | None:
                 Lo=t.matrix("Lo", order, rows),
                 Mo=t.matrix("Mo", rows, rows),
                 regularised=t.number("regularised", 0.0),
+                weight=t.number("event_weight", 0.0, default=1.0),
                 smallest=np.where(smallest < 0, np.inf, smallest),
                 first=np.where(first < 0, np.inf, first),
             )

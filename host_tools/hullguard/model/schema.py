@@ -88,6 +88,7 @@ class Search:
     trials: int
     seed: int
     poles: tuple[float, float]
+    event_weight: tuple[float, float]  # range of the weight of the event error in a trigger-aware post-filter
     size: float  # of the step whose delay is minimised, in the unit of the faulty signal
 
 
@@ -607,6 +608,7 @@ def _read_search(s: Table) -> Search:
         trials=s.whole("trials", 1, 1_000_000, 1000),
         seed=s.whole("seed", 0, 2**32 - 1, 1),
         poles=(float(poles[0]), float(poles[1])),
+        event_weight=_pair(s, "event_weight", 0.01, 100.0, default=1.0),
         size=s.number("size", 1e-9, default=1.0),
     )
     s.close()

@@ -250,6 +250,8 @@ def _generator(design: Design, i: int, g: Generator) -> Iterator[str]:
     yield (
         f"<p>Order {g.spec.order} for {plural(model.plant.n, 'state')}, {plural(residuals, 'residual')}; reads {esc(', '.join(names))}; fed by {esc(sources)}. {esc(_how(g))}</p>"
     )
+    if g.spec.aware and g.spec.filtered:
+        yield f"<p>The post-filter is told {num(design.stored.observers[i].weight)} times the expected event error.</p>"
     if g.filter.regularised > 0:
         yield f"<p><b>The factorisation was singular and is regularised</b>: noise of size {num(g.filter.regularised)} that no one claims was added to each row of Fb.</p>"
     yield _search(design, g)

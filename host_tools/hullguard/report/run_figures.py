@@ -156,7 +156,8 @@ def _times(axes: Sequence[Axes]) -> None:
     axes[-1].set_xlabel("time (s)")
 
 
-def _heading(ax: Axes, text: str, more: str = "", color: str = MUTED) -> None:
+def heading(ax: Axes, text: str, more: str = "", color: str = MUTED) -> None:
+    """A panel's name above its left end, and a remark above its right one."""
     ax.text(0.0, 1.0, text, transform=_above(ax), ha="left", va="bottom", fontweight="bold")
     if more:
         ax.text(1.0, 1.0, more, transform=_above(ax), ha="right", va="bottom", color=color)
@@ -273,7 +274,7 @@ def draw_residual(ax: Axes, run: Run, w: Window, r: Residual, name: str = "") ->
         if first is not None
         else f"largest |r|/J {quiet.max(initial=0.0):.2f}"
     )
-    _heading(ax, name or r.name, more + (", cut at the frame" if cut else ""))
+    heading(ax, name or r.name, more + (", cut at the frame" if cut else ""))
 
 
 def residual_legend(run: Run) -> list[Artist]:
@@ -428,7 +429,7 @@ def _draw_intervals(ax: Axes, run: Run, w: Window, g: GroupRun) -> None:
     ax.set_ylim(0, 1.15 * (1.4 * usual if cut else longest))
     ax.yaxis.set_major_locator(MaxNLocator(4, integer=True, min_n_ticks=2))
     mean_text = "" if g.interval_mean is None else f"mean {g.interval_mean:.2f}, longest {g.interval_max:g}" + (", cut at the frame" if cut else "")
-    _heading(ax, f"{g.name}: samples between frames", mean_text)
+    heading(ax, f"{g.name}: samples between frames", mean_text)
 
 
 def _draw_histogram(bar: Axes, g: GroupRun, beside: Axes) -> None:
@@ -583,7 +584,7 @@ def draw_signal(ax: Axes, run: Run, w: Window, s: SignalRun) -> None:
     ax.set_ylim(bottom, top)
     _number_ticks(ax)
     name, unit = unit_of(s.name)
-    _heading(ax, name + (f" ({unit})" if unit else ""), f"radius ≤ {np.nanmax(radius, initial=0.0):.3g}" + (", cut at the frame" if cut else ""))
+    heading(ax, name + (f" ({unit})" if unit else ""), f"radius ≤ {np.nanmax(radius, initial=0.0):.3g}" + (", cut at the frame" if cut else ""))
 
 
 def signal_figure(run: Run, w: Window) -> Figure:
@@ -638,11 +639,11 @@ def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
     ax = sheet.add(raster, left=left)
     draw_raster(ax, run, w)
     mark_faults(ax, run, w)
-    _heading(ax, "frames sent" if not _is_long(w.size) else "share of samples with a frame")
+    heading(ax, "frames sent" if not _is_long(w.size) else "share of samples with a frame")
     axes.append(ax)
     ax = sheet.add(bars, left=left)
     draw_verdict(ax, run, w)
-    _heading(ax, "verdict")
+    heading(ax, "verdict")
     keys = verdict_legend(run)
     ax.legend(
         handles=keys,
