@@ -38,7 +38,7 @@ class StoredBank:
     """What a design file keeps of a bank: the certificates over the outputs. Those over the inputs follow from them."""
 
     window: int  # samples
-    weight: Array  # certificates x window (oldest sample first) x outputs, 9 significant digits, exact in float32
+    weight: Array  # certificates x window (oldest sample first) x outputs: float32 numbers in 9 significant digits
     faults: int  # mask of the model's faults that can explain an alarm
     hypothesis: int | None = None  # fault whose effect, of any shape over the window, moves no certificate; None for a detection bank
 
@@ -64,7 +64,7 @@ class BankTable:
 
 def stored_weight(weight: Array) -> Array:
     """Certificates as a design file keeps them: float32 numbers in as many digits as tell them apart."""
-    return digits(nearest32(weight), 9)
+    return digits(nearest32(weight), 9) + 0.0  # no -0
 
 
 def full_weight(model: Model, form: WindowForm, weight: Array) -> Array:
@@ -82,7 +82,7 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     `varying`: disturbances whose bounds are radii of derived signals; `fault_size`: largest |f| of the hypothesis' fault, in its signal's units.
     """
     form = window_form(model.plant, bank.window, varying)
-    weight = nearest32(full_weight(model, form, bank.weight))
+    weight = nearest32(full_weight(model, form, nearest32(bank.weight)))
     terms = bank.window * (len(model.signals) + form.Me.shape[1] // bank.window) + 4
     gamma = terms * U32 / (1 - terms * U32)
     widen = float(up32(np.array((1 + gamma) * (1 + gamma) * DOUBLE)))
