@@ -10,11 +10,11 @@ from host_support import SEED, Models
 from hullguard.campaign.tasks import Emulator
 from hullguard.design.arith import nearest32
 from hullguard.design.bank import BankSpec, alarm_delay, candidates, cases, collect, evaluate, first_alarms, make_bank, project, select, shortened, stored_weight, usual_scale
-from hullguard.design.bank_table import BankTable, StoredBank, bank_table
+from hullguard.design.bank_table import BankTable, StoredBank, bank_table, moved
 from hullguard.design.design import Design, usual_radius
 from hullguard.design.limit import Explanation, first_unexplained
 from hullguard.design.reach import largest
-from hullguard.design.window import Varying, window_form
+from hullguard.design.window import Varying, fault_response, window_form
 from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.schema import Model, Reference
@@ -102,6 +102,52 @@ def test_a_smaller_bias_would_alarm(platoon: Design, bank: StoredBank) -> None:
         assert abs(r[0, c]) > J[0, c]
 
 
+@pytest.mark.parametrize("hypothesis", [None, 0, 3])
+def test_the_bias_is_the_stated_sum_whatever_the_weights(platoon: Design, bank: StoredBank, hypothesis: int | None) -> None:
+    # Weights so coarse that the certificates see the states, the inputs and the hypothesis' fault: each term counts.
+    model, plant = platoon.model, platoon.model.plant
+    coarse = replace(bank, weight=bank.weight.round(1), hypothesis=hypothesis)
+    table = bank_table(model, platoon.stored, coarse, fault_size=2.0)
+    form, full = window_form(plant, 30), np.array(table.weight)[::-1].transpose(2, 0, 1)
+    w, w_u = full[:, :, model.outputs].reshape(len(full), -1), full[:, :, model.inputs].reshape(len(full), -1)
+    state, values = platoon.stored.state_range, np.array([largest(model, platoon.stored.signal_reach, i) for i in range(len(model.signals))])
+    left = np.zeros(len(full))
+    if hypothesis is not None:
+        fault = model.faults[hypothesis]
+        values = np.array([max(abs(s.low), abs(s.high)) for s in model.signals])
+        state = state + 2.0 * moved(model, fault)
+        left = 2.0 * np.abs(w @ fault_response(model, form, fault)).sum(1)
+        assert left.max() > 0.0
+    u = np.tile(values[model.inputs], 30)
+    own = np.abs(w @ form.O) @ state + np.abs(w @ form.Md).sum(1) + np.abs(w @ form.Mu + w_u) @ u + left
+    rounding = 2.0**-24 * 30 * len(model.signals) * (np.abs(full).sum(1) @ values)
+    bias = np.array(table.bias)
+    assert np.all(bias >= own + rounding)
+    assert np.all(bias <= (own + 1.05 * rounding) * (1 + 1e-4))
+    assert np.max(np.abs(w @ form.O) @ state / own) > 1e-3
+
+
+@pytest.mark.parametrize("fault", [0, 3])
+def test_no_course_of_a_fault_moves_the_states_further_than_said(platoon: Design, fault: int) -> None:
+    plant, named = platoon.model.plant, platoon.model.faults[fault]
+    assert plant.feedback is not None
+    rng = np.random.default_rng(SEED)
+    bound, furthest = moved(platoon.model, named), np.zeros(plant.n)
+    courses = [np.ones(300), *(rng.choice([-1.0, 1.0], 300) for _ in range(20)), *(np.sign(np.sin(np.arange(300) * f)) for f in (0.02, 0.05, 0.1, 0.2, 0.5))]
+    for course in courses:
+        x = np.zeros(plant.n)
+        for f in course:
+            believed = x.copy()
+            if named.type == "sensor":
+                believed += plant.C[platoon.model.outputs.index(named.signal)] * f
+            x = plant.A @ x - plant.B @ (plant.feedback.gain @ believed)
+            if named.type == "actuator":
+                x += plant.B[:, platoon.model.inputs.index(named.signal)] * f
+            furthest = np.maximum(furthest, np.abs(x))
+    assert np.all(furthest <= bound)
+    assert np.max(furthest / bound) > 0.5
+
+
 @pytest.mark.parametrize("scenario", ["rest", "manoeuvres"])
 def test_no_healthy_run_alarms(platoon: Design, bank: StoredBank, scenario: str) -> None:
     table, emulator = bank_table(platoon.model, platoon.stored, bank), Emulator(platoon.model, platoon.stored)
@@ -177,9 +223,9 @@ def test_a_projection_keeps_zeros_and_leaves_nothing_of_the_basis() -> None:
 def test_tables_are_laid_out_by_lag(platoon: Design, bank: StoredBank) -> None:
     model = platoon.model
     table = bank_table(model, platoon.stored, bank)
-    assert (len(table.weight), len(table.weight[0]), len(table.weight[0][0])) == (30, len(model.signals), 8)
+    assert (len(table.weight), len(table.weight[0]), len(table.weight[0][0])) == (30, len(model.signals), len(bank.weight))
     for place, row in ((model.outputs[2], 2), (model.outputs[0], 0)):
-        assert table.weight[4][place][5] == nearest32(bank.weight[5, 30 - 1 - 4, row])
+        assert table.weight[4][place][2] == nearest32(bank.weight[2, 30 - 1 - 4, row])
     assert table.widen >= 1.0
     assert table.feeds == 0b11
     assert table.extra_weight == ()
@@ -191,7 +237,7 @@ def test_derived_signals_widen_the_threshold_by_what_they_can_do(platoon: Design
     varying = Varying(rng.standard_normal((plant.n, 2)), np.zeros((plant.m, 2)))
     table = bank_table(model, platoon.stored, bank, varying)
     form = window_form(plant, 30, varying)
-    exact = np.abs(nearest32(bank.weight).reshape(8, -1) @ form.Me).reshape(8, 30, 2)
+    exact = np.abs(nearest32(bank.weight).reshape(len(bank.weight), -1) @ form.Me).reshape(-1, 30, 2)
     held = np.array(table.extra_weight)[::-1].transpose(2, 0, 1)
     assert np.all(held >= exact - 1e-12)
     assert np.allclose(held, exact, 1e-4, 1e-7)

@@ -89,6 +89,8 @@ def test_nor_in_random_plants_with_faults_of_every_kind(platoon: Design) -> None
             if len(bank.weight):
                 seen += 1
                 assert largest_ratio(design, model, bank, rng) <= 1.0, model.faults[j]
+                own = fault_response(model, window_form(model.plant, bank.window), model.faults[j])
+                assert np.abs(bank.weight.reshape(len(bank.weight), -1) @ own).max() <= 1e-5 * np.abs(own).max()
     assert seen >= 5
 
 
