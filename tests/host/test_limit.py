@@ -165,7 +165,8 @@ def test_the_command_tells_every_delay_and_does_not_depend_on_workers(cli: Cli) 
 
 def test_a_detector_that_knows_the_feedback_could_be_sooner(cli: Cli) -> None:
     for scenario in ("rest", "manoeuvres"):
-        row = cli("limit", "platoon", "--scenario", scenario, "--fault", "controller2", "--size", "0.5", "--runs", 6, "--json", "-q", "--set", "detector.feedback_known=true").json["rows"][0]
+        told = cli(*LIMIT[:2], "--scenario", scenario, "--fault", "controller2", "--size", "0.5", "--runs", 6, "--json", "-q", "--set", "detector.feedback_known=true")
+        row = told.json["rows"][0]
         assert 1.0 <= row["limit_feedback"] <= 2.0 < row["limit"]
 
 
