@@ -243,6 +243,15 @@ def test_derived_signals_widen_the_threshold_by_what_they_can_do(platoon: Design
     assert np.allclose(held, exact, 1e-4, 1e-7)
 
 
+def test_states_without_a_bound_are_refused(platoon: Design, bank: StoredBank) -> None:
+    boundless = replace(platoon.stored, state_range=np.full(platoon.model.plant.n, np.inf))
+    with pytest.raises(InputError, match="plant.state_range"):
+        bank_table(platoon.model, boundless, bank)
+    open_loop = replace(platoon.model, plant=replace(platoon.model.plant, feedback=None))
+    with pytest.raises(InputError, match="feedback"):
+        bank_table(open_loop, platoon.stored, replace(bank, hypothesis=0))
+
+
 def test_a_fault_that_never_shows_makes_no_bank(platoon: Design) -> None:
     with pytest.raises(InputError, match="larger sizes"):
         make_bank(platoon, replace(SPEC, faults=(1,), sizes=(1e-4,), runs=1))

@@ -91,7 +91,8 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     bias += gamma * mul(np.abs(weight).reshape(len(weight), -1), np.tile(values, bank.window)[:, None])[:, 0]
     bias = (bias + _left(model, bank, form, weight, fault_size)) * (1 + gamma) * DOUBLE
     if not np.all(np.isfinite(bias)):
-        raise InputError(f"{model.path.name}: a certificate bank needs a bound of every state: give plant.state_range")
+        cure = "give plant.state_range" if bank.hypothesis is None else "give [plant] feedback with a stable loop, which bounds what a fault can do"
+        raise InputError(f"{model.path.name}: a certificate bank needs a bound of every state: {cure}")
     used = np.any(weight != 0, axis=(0, 1))
     extra = np.abs(mul(weight[:, :, model.outputs].reshape(len(weight), -1), form.Me)).reshape(len(weight), bank.window, -1)
     return BankTable(
