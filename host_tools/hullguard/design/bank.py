@@ -31,9 +31,11 @@ Real = TypeVar("Real", bound=np.floating)
 
 TRAINING = 2**63  # added to a seed: evaluations have the seeds below
 RUNS_TASK = 10
+DUST = 1e-6  # share of a dual below which the projection has left nothing of it
 SUPPORT = 1e-9  # of a dual's largest entry: what is below is the solver's dust
 DECOUPLED = 1e-7  # what may be left of O and Gamma after the projection, for a certificate of threshold 1
 CAP = 1.5  # samples
+WORTH = 1e-6  # share of the cost that a certificate, or an exchange, must save
 POOL = 2000  # candidates
 FIRST_STAGE = 4  # certificates: a bank of 4, 8, 16 .. is as good as the choice can make it, each the beginning of the next
 
@@ -178,14 +180,16 @@ def collect(design: Design, spec: BankSpec, workers: int = 1, tick: Callable[[st
     parts = each(_Trainer, _work, _Job(design.model, design.stored, spec), tasks, workers, plain)
     duals = [d for p in parts for d in p.dual]
     names = ", ".join(design.model.faults[f].name for f in spec.faults)
-    if not duals:
+    m = design.model.plant.m
+    weight = candidates(design.model, window_form(design.model.plant, spec.window), np.array(duals).reshape(len(duals), spec.window, m), spec.hypothesis)
+    if not len(weight):
         raise InputError(f"{design.model.path.name}: no run with a fault of {names} can be told from a healthy one within {spec.horizon} samples: give larger sizes")
     return Training(
         group=np.array([g for p in parts for g in p.group]),
         limit=np.array([x for p in parts for x in p.limit], dtype=np.float64),
         value=np.array([v for p in parts for v in p.value]),
         radius=np.array([r for p in parts for r in p.radius]),
-        weight=candidates(design.model, window_form(design.model.plant, spec.window), np.array(duals), spec.hypothesis),
+        weight=weight,
     )
 
 
@@ -198,8 +202,11 @@ def usual_threshold(model: Model, form: WindowForm, weight: Array) -> Array:
 def candidates(model: Model, form: WindowForm, duals: Array, hypothesis: int | None) -> Array:
     """Duals projected, scaled, rounded, each once; count x window x outputs."""
     basis = form.O if hypothesis is None else np.hstack([form.O, fault_response(model, form, model.faults[hypothesis])])
-    made = np.array([project(dual.ravel(), basis) for dual in duals])
-    made = made[np.abs(made).max(1) > 0].reshape(-1, form.window, model.plant.m)
+    flat = duals.reshape(len(duals), form.window * model.plant.m)
+    made = np.array([project(dual, basis) for dual in flat]).reshape(flat.shape)
+    made = made[np.abs(made).max(1, initial=0.0) > DUST * np.abs(flat).max(1, initial=0.0)].reshape(-1, form.window, model.plant.m)
+    if not len(made):
+        return np.zeros((0, form.window, model.plant.m))
     made /= usual_threshold(model, form, made)[:, None, None]
     flat = made.reshape(len(made), -1)
     # r and -r are the same certificate: the largest weight is positive.
@@ -209,7 +216,7 @@ def candidates(model: Model, form: WindowForm, duals: Array, hypothesis: int | N
     _, first = np.unique(rounded.round(5), axis=0, return_index=True)
     # A larger pool costs time and gains nothing.
     first = np.sort(first)
-    return rounded[first[:: -(-len(first) // POOL)]]
+    return rounded[first[:: max(1, -(-len(first) // POOL))]]
 
 
 def project(w: Array, basis: Array) -> Array:
@@ -245,7 +252,7 @@ def windows(rows: NDArray[Real], window: int) -> NDArray[Real]:
 
 
 def select(delays: Array, training: Training, size: int) -> list[int]:
-    """Certificates in the order of their choice: greedy, then exchanged one by one as long as that helps, in stages of 4, 8, 16 .."""
+    """At most `size` certificates in the order of their choice, fewer where no other helps: greedy, then exchanged one by one, in stages of 4, 8, 16 .."""
     classes = np.unique(training.group)
     share = np.array([(training.group == c) / np.sum(training.group == c) for c in classes]).T  # runs x classes
     limit = (training.limit @ share)[None]
@@ -255,14 +262,18 @@ def select(delays: Array, training: Training, size: int) -> list[int]:
         best = delays if not others else np.minimum(delays, delays[list(others)].min(0))
         return np.asarray((((best @ share - limit) / np.maximum(limit, CAP)) ** 2).sum(1))
 
-    chosen: list[int] = []
-    stage = FIRST_STAGE
-    while len(chosen) < min(size, len(delays)):
-        fixed = len(chosen)
-        while len(chosen) < min(stage, size, len(delays)):
-            chosen.append(int(cost(chosen).argmin()))
+    chosen = [int(cost([]).argmin())]
+    reached, stage = float(cost([]).min()), FIRST_STAGE
+    while len(chosen) < size:
+        fixed = 0 if stage == FIRST_STAGE else len(chosen)
+        while len(chosen) < min(stage, size):
+            costs = cost(chosen)
+            if costs.min() >= reached * (1 - WORTH):
+                return chosen
+            chosen.append(int(costs.argmin()))
+            reached = float(costs.min())
         _exchange(chosen, fixed, cost)
-        stage *= 2
+        reached, stage = float(cost(chosen[:-1])[chosen[-1]]), 2 * stage
     return chosen
 
 
@@ -274,7 +285,7 @@ def _exchange(chosen: list[int], fixed: int, cost: Callable[[Sequence[int]], Arr
         for i in range(fixed, len(chosen)):
             all_costs = cost([c for j, c in enumerate(chosen) if j != i])
             best = int(all_costs.argmin())
-            if all_costs[best] < all_costs[chosen[i]] * (1 - 1e-6):
+            if all_costs[best] < all_costs[chosen[i]] * (1 - WORTH):
                 chosen[i], better = best, True
 
 

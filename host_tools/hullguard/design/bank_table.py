@@ -34,7 +34,7 @@ SETTLE_MAX = 20_000
 
 def stored_weight(weight: Array) -> Array:
     """Certificates as a design file keeps them: float32 numbers in as many digits as tell them apart."""
-    return digits(nearest32(weight), 9)
+    return digits(nearest32(weight), 9) + 0.0  # no -0
 
 
 def full_weight(model: Model, form: WindowForm, weight: Array) -> Array:
@@ -52,7 +52,7 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     `varying`: disturbances whose bounds are radii of derived signals; `fault_size`: largest |f| of the hypothesis' fault, in its signal's units.
     """
     form = window_form(model.plant, bank.window, varying)
-    weight = nearest32(full_weight(model, form, bank.weight))
+    weight = nearest32(full_weight(model, form, nearest32(bank.weight)))
     terms = bank.window * (len(model.signals) + form.Me.shape[1] // bank.window) + 4
     gamma = terms * U32 / (1 - terms * U32)
     widen = float(up32(np.array((1 + gamma) * (1 + gamma) * DOUBLE)))
@@ -61,7 +61,8 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     bias += gamma * mul(np.abs(weight).reshape(len(weight), -1), np.tile(values, bank.window)[:, None])[:, 0]
     bias = (bias + _left(model, bank, form, weight, fault_size)) * (1 + gamma) * DOUBLE
     if not np.all(np.isfinite(bias)):
-        raise InputError(f"{model.path.name}: a certificate bank needs a bound of every state: give plant.state_range")
+        cure = "give plant.state_range" if bank.hypothesis is None else "give [plant] feedback with a stable loop, which bounds what a fault can do"
+        raise InputError(f"{model.path.name}: a certificate bank needs a bound of every state: {cure}")
     used = np.any(weight != 0, axis=(0, 1))
     extra = np.abs(mul(weight[:, :, model.outputs].reshape(len(weight), -1), form.Me)).reshape(len(weight), bank.window, -1)
     return BankTable(

@@ -41,19 +41,27 @@ class Pair:
 
 def isolability(model: Model, window: int, faults: tuple[int, ...], within: int = WITHIN) -> list[Pair]:
     """Every ordered pair of the given faults."""
+    pairs = []
+    for (i, j), apart in separable(model, window, faults).items():
+        truth, hypothesis = model.faults[i], model.faults[j]
+        smallest = _smallest(model, window, truth, hypothesis, within) if apart else None
+        pairs.append(Pair(i, j, apart, smallest, _reason(truth.name, hypothesis.name, apart, smallest, within)))
+    return pairs
+
+
+def separable(model: Model, window: int, faults: tuple[int, ...]) -> dict[tuple[int, int], bool]:
+    """For every (truth, hypothesis): is there a w with w'O = 0, w'Gamma_hypothesis = 0 and w'Gamma_truth not 0."""
     form = window_form(model.plant, window)
     response = {i: fault_response(model, form, model.faults[i]) for i in faults}
-    pairs = []
+    found = {}
     for j in faults:
         U, sigma, _ = np.linalg.svd(np.hstack([form.O, response[j]]), full_matrices=False)
         span = U[:, sigma > RANGE * sigma[0]]
         for i in faults:
             if i != j:
                 left = response[i] - span @ (span.T @ response[i])
-                separable = bool(np.abs(left).max() > SEPARATE * np.abs(response[i]).max())
-                smallest = _smallest(model, window, model.faults[i], model.faults[j], within) if separable else None
-                pairs.append(Pair(i, j, separable, smallest, _reason(model.faults[i].name, model.faults[j].name, separable, smallest, within)))
-    return pairs
+                found[i, j] = bool(np.abs(left).max() > SEPARATE * np.abs(response[i]).max())
+    return found
 
 
 def _reason(truth: str, hypothesis: str, separable: bool, smallest: float | None, within: int) -> str:
@@ -107,10 +115,10 @@ def _least_scale(model: Model, window: int, truth: Fault, hypothesis: Fault, ago
 
 def hypotheses(model: Model, spec: BankSpec) -> list[BankSpec]:
     """A bank's spec for each fault of the given one, trained on the other faults that can be told from it."""
-    pairs = isolability(model, spec.window, spec.faults, 0)
+    apart = separable(model, spec.window, spec.faults)
     made = []
     for j in spec.faults:
-        others = tuple(p.truth for p in pairs if p.hypothesis == j and p.separable)
+        others = tuple(i for i in spec.faults if apart.get((i, j), False))
         if others:
             made.append(replace(spec, hypothesis=j, faults=others))
     return made
