@@ -391,6 +391,28 @@ def test_samples_of_the_silent_phase_are_counted(models: Models, silence: int) -
 # ---- the attack ----
 
 
+@pytest.mark.parametrize("overrides", [None, SILENT_1, ADAPTIVE], ids=["always", "silent", "adaptive"])
+def test_a_trace_tells_what_silent_senders_promise(models: Models, overrides: dict[str, Any] | None) -> None:
+    """Without losses the receiver knows it too: the radius is the promise with the rounding of the value sent, or the slew where that is less."""
+    ready = models.platoon("manoeuvres", overrides)
+    trace = ready.batch(2000).trace(0)
+    promise, radius, off = trace["promise"][:, :3], trace["radius"][:, :3], np.abs(trace["reading"] - trace["value"])[:, :3]
+    silent = (trace["events"] & 1) == 0
+    looked = np.isfinite(promise).all(axis=1)
+    assert not np.any(looked & ~silent)
+    assert np.isinf(promise[~looked]).all()
+    first = [silent[k] and not silent[k - 1] for k in range(1, 2000)]
+    if overrides is None:
+        assert np.array_equal(looked, silent)
+    elif overrides is SILENT_1:
+        assert np.array_equal(looked[1:], silent[1:] & ~np.array(first))
+    assert np.isinf(trace["promise"][:, 3:]).all(), "the closing group is never silent"
+    assert (off[looked] <= promise[looked] + 1e-4).all()
+    assert (radius[looked] <= promise[looked] + 1e-4).all()
+    bound_by_promise = np.abs(radius - promise)[looked] <= 1e-4
+    assert bound_by_promise.mean() > 0.5
+
+
 def attack_on(ready: Ready, last: int = 149, **options: Any) -> tuple[Attack, np.ndarray, np.ndarray]:
     plant = ready.design.model.plant
     d, x = np.zeros((150, plant.Ed.shape[1])), np.zeros(plant.n)
