@@ -480,6 +480,34 @@ def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_the
     assert np.abs(predicted).max() > 200 * quantum
 
 
+def test_an_attack_reaches_what_its_programme_promises_where_the_frames_come_as_before(models: Models, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, d, x = attack_on(models.platoon("manoeuvres", real="f64"))
+    gained: list[float] = []
+    plain = attack.scipy.optimize.milp
+
+    def spy(c: Any, **options: Any) -> Any:
+        solved = plain(c, **options)
+        gained.append(0.0 if solved.fun is None else -float(solved.fun))
+        return solved
+
+    monkeypatch.setattr(attack.scipy.optimize, "milp", spy)
+    rng = np.random.default_rng([SEED, 5])
+    compared = 0
+    for number in range(120):
+        sample, row = int(rng.integers(3, 60)), int(rng.integers(2))
+        d[:], x[:] = rng.choice([-1.0, 1.0], d.shape), 0.0
+        before = made._batch.trace(number)
+        if not made._improve(before, made._weights[row], sample):
+            continue
+        after = made._batch.trace(number)
+        window = slice(0, sample + 1)
+        if np.array_equal(before["events"][window], after["events"][window]):
+            compared += 1
+            assert gained[-1] > 0.0
+            assert after["r"][sample, row] == pytest.approx(before["r"][sample, row] + gained[-1], abs=0.03 * after["J"][sample, row])
+    assert compared >= 3
+
+
 def test_a_pattern_that_no_disturbance_fits_ends_the_attack(models: Models, monkeypatch: pytest.MonkeyPatch) -> None:
     made, _, _ = attack_on(models.platoon("manoeuvres"))
     plain = made._promises
