@@ -32,6 +32,7 @@ from hullguard.campaign.case import COLUMNS, Case, Rows, chunk, setup_of
 from hullguard.campaign.chunks import Chunks
 from hullguard.campaign.summary import summary, upper_bound
 from hullguard.core.library import library
+from hullguard.core.native import Native
 from hullguard.design import store
 from hullguard.design.design import finish
 from hullguard.errors import InputError
@@ -459,7 +460,7 @@ def test_an_attack_aims_before_the_fault(models: Models) -> None:
 def test_residuals_are_the_functionals_that_an_attack_takes_them_for(models: Models) -> None:
     for name, scenario in (("platoon", "manoeuvres"), ("openacc", "default")):
         made = models.design(None, scenario, name)
-        ready = Ready(made, models.platoon().native.__class__(library("f64"), made.tables), made.model.scenario(scenario).reference, 150)
+        ready = Ready(made, Native(library("f64"), made.tables), made.model.scenario(scenario).reference, 150)
         trace = ready.batch(150).trace(0)
         weights = attack.functionals(made.tables, 120)
         for k in (125, 149):
