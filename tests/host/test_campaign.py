@@ -32,6 +32,7 @@ from hullguard.campaign.case import COLUMNS, Case, Rows, chunk, setup_of
 from hullguard.campaign.chunks import Chunks
 from hullguard.campaign.summary import summary, upper_bound
 from hullguard.core.library import library
+from hullguard.core.native import Native
 from hullguard.design import store
 from hullguard.design.design import finish
 from hullguard.errors import InputError
@@ -391,6 +392,28 @@ def test_samples_of_the_silent_phase_are_counted(models: Models, silence: int) -
 # ---- the attack ----
 
 
+@pytest.mark.parametrize("overrides", [None, SILENT_1, ADAPTIVE], ids=["always", "silent", "adaptive"])
+def test_a_trace_tells_what_silent_senders_promise(models: Models, overrides: dict[str, Any] | None) -> None:
+    """Without losses the receiver knows it too: the radius is the promise with the rounding of the value sent, or the slew where that is less."""
+    ready = models.platoon("manoeuvres", overrides)
+    trace = ready.batch(2000).trace(0)
+    promise, radius, off = trace["promise"][:, :3], trace["radius"][:, :3], np.abs(trace["reading"] - trace["value"])[:, :3]
+    silent = (trace["events"] & 1) == 0
+    looked = np.isfinite(promise).all(axis=1)
+    assert not np.any(looked & ~silent)
+    assert np.isinf(promise[~looked]).all()
+    first = [silent[k] and not silent[k - 1] for k in range(1, 2000)]
+    if overrides is None:
+        assert np.array_equal(looked, silent)
+    elif overrides is SILENT_1:
+        assert np.array_equal(looked[1:], silent[1:] & ~np.array(first))
+    assert np.isinf(trace["promise"][:, 3:]).all(), "the closing group is never silent"
+    assert (off[looked] <= promise[looked] + 1e-4).all()
+    assert (radius[looked] <= promise[looked] + 1e-4).all()
+    bound_by_promise = np.abs(radius - promise)[looked] <= 1e-4
+    assert bound_by_promise.mean() > 0.5
+
+
 def attack_on(ready: Ready, last: int = 149, **options: Any) -> tuple[Attack, np.ndarray, np.ndarray]:
     plant = ready.design.model.plant
     d, x = np.zeros((150, plant.Ed.shape[1])), np.zeros(plant.n)
@@ -437,7 +460,7 @@ def test_an_attack_aims_before_the_fault(models: Models) -> None:
 def test_residuals_are_the_functionals_that_an_attack_takes_them_for(models: Models) -> None:
     for name, scenario in (("platoon", "manoeuvres"), ("openacc", "default")):
         made = models.design(None, scenario, name)
-        ready = Ready(made, models.platoon().native.__class__(library("f64"), made.tables), made.model.scenario(scenario).reference, 150)
+        ready = Ready(made, Native(library("f64"), made.tables), made.model.scenario(scenario).reference, 150)
         trace = ready.batch(150).trace(0)
         weights = attack.functionals(made.tables, 120)
         for k in (125, 149):
@@ -456,6 +479,34 @@ def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_the
     # The plant applies what the wire carries: each sample's inputs are rounded, and the loop carries that on.
     assert np.abs(after - before - predicted).max() <= 20 * quantum
     assert np.abs(predicted).max() > 200 * quantum
+
+
+def test_an_attack_reaches_what_its_programme_promises_where_the_frames_come_as_before(models: Models, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, d, x = attack_on(models.platoon("manoeuvres", real="f64"))
+    gained: list[float] = []
+    plain = attack.scipy.optimize.milp
+
+    def spy(c: Any, **options: Any) -> Any:
+        solved = plain(c, **options)
+        gained.append(0.0 if solved.fun is None else -float(solved.fun))
+        return solved
+
+    monkeypatch.setattr(attack.scipy.optimize, "milp", spy)
+    rng = np.random.default_rng([SEED, 5])
+    compared = 0
+    for number in range(120):
+        sample, row = int(rng.integers(3, 60)), int(rng.integers(2))
+        d[:], x[:] = rng.choice([-1.0, 1.0], d.shape), 0.0
+        before = made._batch.trace(number)
+        if not made._improve(before, made._weights[row], sample):
+            continue
+        after = made._batch.trace(number)
+        window = slice(0, sample + 1)
+        if np.array_equal(before["events"][window], after["events"][window]):
+            compared += 1
+            assert gained[-1] > 0.0
+            assert after["r"][sample, row] == pytest.approx(before["r"][sample, row] + gained[-1], abs=0.03 * after["J"][sample, row])
+    assert compared >= 3
 
 
 def test_a_pattern_that_no_disturbance_fits_ends_the_attack(models: Models, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -82,11 +82,12 @@ class Attack:
         row, sample, sign = int(rng.integers(len(self._weights))), int(rng.integers(self._last + 1)), float(rng.choice([-1.0, 1.0]))
         self._d[:] = rng.choice([-1.0, 1.0], self._d.shape)
         self._x[:] = self._plant.equilibrium + self._plant.initial_range * rng.choice([-1.0, 1.0], self._plant.n)
-        reached, worst = -1.0, {}
+        reached = -np.inf
+        worst: dict[str, Any] = {}
         for left in range(ROUNDS, -1, -1):
             trace = self._batch.trace(number)
             ratio = float(sign * trace["r"][sample, row] / trace["J"][sample, row])
-            if ratio > reached:
+            if not worst or ratio > reached:
                 reached, worst = ratio, self._batch.runs(number, 1)[0]
             if left == 0 or not self._improve(trace, sign * self._weights[row], sample):
                 break
