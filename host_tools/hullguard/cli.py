@@ -152,6 +152,8 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--size", metavar="X[,X..]", help="size of every fault, instead of its own; a list is a case each")
     p.add_argument("--each-fault", action="store_true", help="one case a fault (default: all faults in every run)")
     p.add_argument("--vary", action="append", default=[], metavar="KEY=V1,V2..", help="like --set, a case and a design for each value; may be given more than once")
+    p.add_argument("--limit", action="store_true", help="add the earliest detection that any sound detector could make, by linear programming, to each case")
+    p.add_argument("--plants", type=_positive, default=0, metavar="M", help="emulate M plants drawn from the model's intervals in turn, half of them at corners")
     p.add_argument("--attack", type=float, default=0.0, metavar="SHARE", help="share of the runs whose disturbances are chosen against the detector, within the model's bounds")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
     p.add_argument("--scheduler", metavar="ADDRESS", help="work on a Dask cluster instead: its scheduler's tcp://HOST:PORT, or local; the results are the same")

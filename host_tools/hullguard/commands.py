@@ -509,9 +509,11 @@ def _campaign_cases(args: argparse.Namespace, keep: Path | None) -> list[Case]:
         scenario = made.model.scenario(args.scenario)
         samples = args.samples or scenario.samples
         faults = the_faults(args, made.model, scenario.faults, samples)
+        if args.plants and made.model.plant.interval is None:
+            raise InputError(f"--plants: model {made.model.name} has no interval to draw from; give a parameter as {{ value = 1.0, pm = 0.1 }}")
         if attack and min((f.start for f in faults), default=1) < 1:
             raise InputError("--attack aims at samples before the first fault: let it start at sample 1 or later")
-        base = Case(setup_of(made, args.real), samples, scenario.reference, (), args.seed, attack=attack, varied=tuple(varied.items()))
+        base = Case(setup_of(made, args.real), samples, scenario.reference, (), args.seed, attack=attack, plants=args.plants, varied=tuple(varied.items()))
         cases += [replace(base, faults=f, loss=p, burst=b) for f in grid.fault_sets(faults, args.each_fault, sizes) for p in losses for b in bursts]
     return cases
 
@@ -549,7 +551,7 @@ def run_campaign(args: argparse.Namespace) -> int:
             tick("runs", sum(done), args.runs * len(cases))
 
         parts = list(zip(cases, campaign(cases, args.runs, way, more, kept), strict=True))
-    result = campaign_result(parts, args.scenario)
+    result = campaign_result(parts, args.scenario, _campaign_limits(args, cases))
     took = time.monotonic() - began
     notes = write_results(out, parts, result) if out else []
     if args.table:
@@ -560,6 +562,19 @@ def run_campaign(args: argparse.Namespace) -> int:
         say(args, line)
     emit(args, result)
     return _campaign_expected(args, result)
+
+
+def _campaign_limits(args: argparse.Namespace, cases: Sequence[Case]) -> list[float | None]:
+    if not args.limit:
+        return []
+    from hullguard.campaign.limit_case import limit_of
+
+    with progress(args, "limit") as tick:
+        found = []
+        for i, case in enumerate(cases):
+            found.append(limit_of(case, args.runs))
+            tick("cases", i + 1, len(cases))
+    return found
 
 
 def _campaign_expected(args: argparse.Namespace, result: dict[str, Any]) -> int:

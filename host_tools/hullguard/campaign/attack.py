@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hullguard.core.native import Batch
 from hullguard.design.design import Design
 from hullguard.design.tables import Tables
+from hullguard.model.plant import Plant
 from hullguard.model.schema import Model
 from hullguard.model.table import Array
 
@@ -26,23 +27,37 @@ ROUNDS = 2  # linear programmes a run, each with the pattern of the run before
 STREAM = 0xA77AC  # keeps the draws apart from those of anything else that the seed feeds
 
 
-def functionals(tables: Tables, horizon: int) -> Array:
-    """Every residual as a functional of the values held: w[i, j, g] weighs value_g(K - j)   (residuals x horizon + 1 x signals)."""
-    blocks = []
-    for g in tables.generators:
-        weight = np.zeros((len(g.output), horizon + 1, tables.signals))
-        state, inward, shown = np.array(g.state), np.array(g.input), np.array(g.output)
-        weight[:, 0, list(g.signal)] = np.array(g.direct)
+def functionals(tables: Tables, horizon: int) -> tuple[Array, NDArray[np.intp]]:
+    """Every residual and certificate as a functional of the values held: w[i, j, g] weighs value_g(K - j), functionals x horizon + 1 x signals.
+
+    Beside it, for each, the place of its |r| / J in a trace: a bank has one place for all its certificates. A predicted signal counts as the
+    held one it stands for.
+    """
+    held = list(range(tables.signals)) + [p.first + g for p in tables.predictors for g in range(len(p.output))]
+    blocks: list[Array] = []
+    places: list[int] = []
+    for generator in tables.generators:
+        weight = np.zeros((len(generator.output), horizon + 1, tables.signals))
+        state, inward, shown = np.array(generator.state), np.array(generator.input), np.array(generator.output)
+        signal = [held[g] for g in generator.signal]
+        weight[:, 0, signal] = np.array(generator.direct)
         for j in range(1, horizon + 1):
-            weight[:, j, list(g.signal)] = shown @ inward
+            weight[:, j, signal] = shown @ inward
             shown = shown @ state
+        places += range(len(places), len(places) + len(generator.output))
         blocks.append(weight)
-    return np.concatenate(blocks)
+    for b, bank in enumerate(tables.banks):
+        weight = np.zeros((bank.certificates, horizon + 1, tables.signals))
+        kept = min(bank.window, horizon + 1)
+        weight[:, :kept, list(bank.signal)] = np.array(bank.weight)[:kept].transpose(2, 0, 1)
+        places += [tables.residuals - len(tables.banks) + b] * bank.certificates
+        blocks.append(weight)
+    return np.concatenate(blocks), np.array(places, dtype=np.intp)
 
 
-def sensitivity(model: Model, horizon: int) -> Array:
+def sensitivity(model: Model, plant: Plant, horizon: int) -> Array:
     """Readings of samples 0 .. horizon by disturbance (sample by sample) and state at sample 0, loop closed: (samples, signals, samples nd + n)."""
-    plant, count = model.plant, horizon + 1
+    count = horizon + 1
     nd, gain = plant.Ed.shape[1], plant.feedback.gain if plant.feedback is not None else np.zeros((plant.p, plant.n))
     closed = plant.A - plant.B @ gain
     shown = np.zeros((len(model.signals), plant.n))
@@ -72,7 +87,8 @@ class Attack:
         """`last`: latest sample to aim at, the one before a fault begins."""
         self._batch, self._plant, self._seed, self._last, self._horizon = batch, design.model.plant, seed, last, horizon
         self._d, self._x = disturbance, initial
-        self._weights, self._moves = functionals(design.tables, horizon), sensitivity(design.model, horizon)
+        self._weights, self._places = functionals(design.tables, horizon)
+        self._moves = [sensitivity(design.model, plant, horizon) for plant in batch.plants]
         self._group = np.array([i for i, g in enumerate(design.model.groups) for _ in g.signals])
         self._half = np.array([s.resolution / 2 for s in design.model.signals])
 
@@ -86,19 +102,23 @@ class Attack:
         worst: dict[str, Any] = {}
         for left in range(ROUNDS, -1, -1):
             trace = self._batch.trace(number)
-            ratio = float(sign * trace["r"][sample, row] / trace["J"][sample, row])
+            place = self._places[row]
+            ratio = float(abs(trace["r"][sample, place]) / trace["J"][sample, place])
             if not worst or ratio > reached:
                 reached, worst = ratio, self._batch.runs(number, 1)[0]
-            if left == 0 or not self._improve(trace, sign * self._weights[row], sample):
+            if left == 0 or not self._improve(trace, sign * self._weights[row], sample, self._moves[number % len(self._moves)]):
                 break
         return worst
 
-    def _improve(self, trace: dict[str, Array], weights: Array, sample: int) -> bool:
-        """Rewrite disturbance and initial state for the largest weights . values at `sample`; False when the pattern of the trace admits none."""
+    def _improve(self, trace: dict[str, Array], weights: Array, sample: int, plant: Array) -> bool:
+        """Rewrite disturbance and initial state for the largest weights . values at `sample`; False when the pattern of the trace admits none.
+
+        `plant`: how the readings of the run's own plant move.
+        """
         first = max(0, sample - self._horizon)
         count, nd = sample - first + 1, self._d.shape[1]
         # One window's matrix serves all: its first blocks are a shorter window's. The state moves only where the window begins with the run.
-        moves = np.concatenate([self._moves[:count, :, : count * nd], self._moves[:count, :, -self._plant.n :]], axis=2)
+        moves = np.concatenate([plant[:count, :, : count * nd], plant[:count, :, -self._plant.n :]], axis=2)
         now = np.concatenate([self._d[first : sample + 1].ravel(), self._x])
         span = np.concatenate([np.ones(count * nd), self._plant.initial_range if first == 0 else np.zeros(self._plant.n)])
         middle = np.concatenate([np.zeros(count * nd), self._plant.equilibrium if first == 0 else self._x])

@@ -20,10 +20,12 @@ from hullguard.design.design import Design, finish
 from hullguard.design.store import Stored
 from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
+from hullguard.model.plant import draw
 from hullguard.model.schema import Model, Reference
 
 Rows = dict[str, NDArray[Any]]  # a column a name, a place a run
 
+PLANTS = 0x91A27  # keeps the draws of plants apart from those of anything else that the seed feeds
 VERSION = 1  # rises when the same case would give other rows, or other columns
 FLOATS = ("margin", "margin_settled", "margin_after")
 COLUMNS = ("run", "attacked", *RESULT)
@@ -86,6 +88,7 @@ class Case(Keyed):
     loss: float = 0.0
     burst: int = 0  # samples
     attack: float = 0.0  # share of the runs
+    plants: int = 0  # drawn from the model's intervals, one after another; 0: the model's own
     start: int = REST
     varied: tuple[tuple[str, Any], ...] = ()  # keys of the model with their values in this case
 
@@ -131,6 +134,7 @@ class Case(Keyed):
             "loss": self.loss,
             "loss_burst": self.burst,
             "attack": self.attack,
+            "plants": self.plants,
         }
 
 
@@ -151,7 +155,8 @@ def _ready(case: Case) -> tuple[Batch, Attack | None]:
 
 def _batch(case: Case, native: Native, design: Design, **chosen: Any) -> Batch:
     """The only place where a case becomes a configuration of the batch loop."""
-    return Batch(native, design, case.samples, case.reference, case.faults, case.seed, case.loss, case.start, case.burst, **chosen)
+    plants = [draw(case.setup.model.plant, np.random.default_rng([case.seed, i, PLANTS])) for i in range(case.plants)]
+    return Batch(native, design, case.samples, case.reference, case.faults, case.seed, case.loss, case.start, case.burst, plants=plants, **chosen)
 
 
 def _attack(case: Case, native: Native, design: Design) -> Attack:
@@ -159,6 +164,11 @@ def _attack(case: Case, native: Native, design: Design) -> Attack:
     disturbance, initial = np.zeros((case.samples, plant.Ed.shape[1])), np.zeros(plant.n)
     last = (case.samples if case.fault_start is None else case.fault_start) - 1
     return Attack(_batch(case, native, design, disturbance=disturbance, initial=initial), design, disturbance, initial, case.seed, last)
+
+
+def configured(case: Case) -> tuple[Batch, Design]:
+    """The case's runs as they come, and its design."""
+    return _ready(case)[0], _native(case.setup)[1]
 
 
 def columns(rows: Sequence[dict[str, Any]]) -> Rows:

@@ -15,13 +15,15 @@ from hullguard.errors import InputError
 ROWS_MAX = 2000  # runs that are listed one by one; of more, the table has them
 
 
-def campaign_result(parts: Sequence[tuple[Case, Rows]], scenario: str | None) -> dict[str, Any]:
+def campaign_result(parts: Sequence[tuple[Case, Rows]], scenario: str | None, limits: Sequence[float | None] = ()) -> dict[str, Any]:
     """What --json prints: all cases together, each case, and the rows of few runs."""
     first = parts[0][0]
     head = {"model": first.setup.model.name, "real": first.setup.real, "scenario": first.setup.model.scenario(scenario).name, "confidence": CONFIDENCE}
     shared = {k: v for k, v in first.labels().items() if all(case.labels()[k] == v for case, _ in parts)}
     told = names([case for case, _ in parts])
     cases = [{"case": i, "name": told[i], **case.labels(), **summary([(case, rows)])} for i, (case, rows) in enumerate(parts)]
+    for case, limit in zip(cases, limits, strict=False):
+        case["limit"] = limit
     result: dict[str, Any] = {**head, **shared, **summary(parts), "cases": cases}
     if result["runs"] <= ROWS_MAX:
         result["rows"] = [
@@ -65,6 +67,7 @@ def describe(result: dict[str, Any]) -> Iterator[str]:
     for case in result["cases"]:
         if "faults" in case:
             delay = "never" if case["delay_mean"] is None else f"mean delay {case['delay_mean']:.2f} samples, longest {case['delay_max']}"
+            delay += "" if case.get("limit") is None else f", limit {case['limit']:.2f}"
             yield f"{case['name'] if many else ', '.join(case['faults'])}: found in {case['detected_runs']} of {case['runs']} runs, {delay}"
         elif many:
             yield f"{case['name']}: {case['provisional_alarm_runs']} runs with a provisional alarm, {case['false_alarm_runs']} confirmed"

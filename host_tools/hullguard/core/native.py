@@ -473,7 +473,8 @@ class Batch:
         """`plants`: what the runs emulate in turn; without them plants of the model's intervals, drawn by the seed."""
         ffi, model = native.library.ffi, design.model
         self._native, self._model = native, model
-        made = [PlantConfig(native, design, p) for p in plants or emulated(model.plant, seed)]
+        self.plants = list(plants or emulated(model.plant, seed))
+        made = [PlantConfig(native, design, p) for p in self.plants]
         configs = ffi.new("hgh_plant_config[]", [p.config[0] for p in made])
         self._keep: list[Any] = [configs, fault_array(native.library, model, faults), made]
 

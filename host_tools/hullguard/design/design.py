@@ -415,7 +415,9 @@ def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, .
     made = []
     for b in used_banks(model, stored):
         size = model.faults[b.hypothesis].size_max if b.hypothesis is not None else None
-        made.append(replace(bank_table(model, stored, b, varying, size or FAULT_SIZE), extra=derived.uncertain))
+        table = bank_table(model, stored, b, varying, size or FAULT_SIZE)
+        behind = _feeds(model, set(derived.mismatch.signal)) if derived.mismatch is not None else 0  # what the radii of uncertain states follow from
+        made.append(replace(table, extra=derived.uncertain, feeds=table.feeds | behind))
     if len(model.observers) + len(made) > GENERATORS_MAX:
         raise InputError(f"{model.path.name}: {len(model.observers)} observers and {len(made)} banks, {GENERATORS_MAX} are possible; isolate fewer faults")
     return tuple(made)
