@@ -458,14 +458,16 @@ def test_an_attack_aims_before_the_fault(models: Models) -> None:
 
 
 def test_residuals_are_the_functionals_that_an_attack_takes_them_for(models: Models) -> None:
-    for name, scenario in (("platoon", "manoeuvres"), ("openacc", "default")):
+    for name, scenario in (("platoon", "manoeuvres"), ("openacc", "default"), ("platoon_bank", "manoeuvres")):
         made = models.design(None, scenario, name)
         ready = Ready(made, Native(library("f64"), made.tables), made.model.scenario(scenario).reference, 150)
         trace = ready.batch(150).trace(0)
-        weights, _ = attack.functionals(made.tables, 120)
+        weights, places = attack.functionals(made.tables, 120)
         for k in (125, 149):
             r = np.einsum("ijg,jg->i", weights, trace["value"][k - np.arange(121)])
-            assert np.abs(r - trace["r"][k]).max() <= 1e-6 * max(1.0, np.abs(trace["r"]).max()), name
+            # Of a bank's certificates the trace shows the one that comes closest.
+            for place in range(made.tables.residuals):
+                assert np.abs(r[places == place] - trace["r"][k, place]).min() <= 1e-6 * max(1.0, np.abs(trace["r"]).max()), name
 
 
 def test_readings_move_with_disturbance_and_initial_state_as_an_attack_takes_them_to(models: Models) -> None:
@@ -498,7 +500,7 @@ def test_an_attack_reaches_what_its_programme_promises_where_the_frames_come_as_
         sample, row = int(rng.integers(3, 60)), int(rng.integers(2))
         d[:], x[:] = rng.choice([-1.0, 1.0], d.shape), 0.0
         before = made._batch.trace(number)
-        if not made._improve(before, made._weights[row], sample):
+        if not made._improve(before, made._weights[row], sample, made._moves[0]):
             continue
         after = made._batch.trace(number)
         window = slice(0, sample + 1)

@@ -64,21 +64,25 @@ resolution = 0.001
 name = "controller1"
 signal = "control1_mps2"
 type = "actuator"
+size_max = 3.0
 
 [[faults]]
 name = "controller2"
 signal = "control2_mps2"
 type = "actuator"
+size_max = 3.0
 
 [[faults]]
 name = "gap12_sensor"
 signal = "gap12_m"
 type = "sensor"
+size_max = 3.0
 
 [[faults]]
 name = "speed1_sensor"
 signal = "speed1_mps"
 type = "sensor"
+size_max = 3.0
 """
 
 

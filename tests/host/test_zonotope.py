@@ -118,7 +118,7 @@ def table_of(lin: hull.Linear, radius: Array, columns: int, reduction: int, bias
     one, none = up32(np.full((1, residuals), bias)), np.zeros(residuals)
     steady = exact(lin, np.tile(radius, (100, 1)), one)[-1]
     tables = hull.HullTables(np.zeros((1, residuals, width)), one, one, 0, 0, 0.0, np.zeros(width), none, none, steady)
-    ranges = hull.Ranges(np.zeros(s), np.zeros(s), np.zeros(width), np.zeros(0))
+    ranges = hull.Ranges(np.zeros(s), np.zeros(s), np.zeros(width), np.zeros(0), np.zeros(0))
     return zonotope.build(lin, np.eye(s), sub, ranges, radius, tables, tuple(range(width)), columns, reduction, "random")
 
 
@@ -288,7 +288,7 @@ def table_for(made: Design, number: int, columns: int, reduction: int, published
     g, model = made.generators[number], made.model
     places = made.tables.generators[number].signal
     values = np.array([max(abs(model.signals[i].low), abs(model.signals[i].high)) for i in places])
-    ranges = hull.Ranges(np.abs(model.plant.equilibrium) + model.plant.initial_range, made.stored.state_range, values, values[len(g.spec.outputs) :])
+    ranges = hull.Ranges(np.abs(model.plant.equilibrium) + model.plant.initial_range, made.stored.state_range, values, values[len(g.spec.outputs) :], np.zeros(0))
     signal = tuple(range(len(places)))
     return zonotope.build(g.linear, g.observer.T, g.plant, ranges, g.radius, g.tables, signal, columns, reduction, "shipped", published)
 
