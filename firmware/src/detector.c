@@ -30,7 +30,7 @@ uint32_t hg_detector_sums(const hg_detector_config *config)
     return sums;
 }
 
-static bool sizes_valid(const hg_detector_config *config)
+static bool counts_valid(const hg_detector_config *config)
 {
     const uint16_t judged = (uint16_t)config->generators + config->banks;
     bool valid = (config->signals >= 1U) && (config->width >= config->signals) && (config->history >= 1U) && (config->groups >= 1U) &&
@@ -72,7 +72,7 @@ static bool derived_valid(const hg_detector_config *config)
     return valid && (width == config->width);
 }
 
-/* A rewind must end inside the ring, and inside the taps: what a tail has taken in cannot be corrected. */
+/* A rewind must end inside the taps: what a tail has taken in cannot be corrected. A zonotope needs the old radii of all that is rewritten. */
 static bool rewinds_end(const hg_detector_config *config, uint8_t inside)
 {
     bool valid = true;
@@ -85,12 +85,13 @@ static bool rewinds_end(const hg_detector_config *config, uint8_t inside)
 static bool generator_valid(const hg_detector_config *config, uint8_t g)
 {
     const hg_residual_config *residual = &config->residual[g];
-    bool valid = (residual->signal != NULL) && (residual->residuals >= 1U);
+    bool valid = false;
     if (config->hull != NULL) {
-        valid = valid && (residual->residuals == config->hull[g].residuals) && rewinds_end(config, config->hull[g].taps);
+        valid = (residual->residuals == config->hull[g].residuals) && rewinds_end(config, config->hull[g].taps);
     } else {
-        valid = valid && (residual->residuals == config->zonotope[g].residuals);
+        valid = (residual->residuals == config->zonotope[g].residuals) && rewinds_end(config, (uint8_t)(config->history - 1U));
     }
+    valid = valid && (residual->signal != NULL);
     for (uint8_t i = 0U; valid && (i < residual->width); i++) {
         valid = residual->signal[i] < config->width;
     }
@@ -100,7 +101,7 @@ static bool generator_valid(const hg_detector_config *config, uint8_t g)
 static bool generators_valid(const hg_detector_config *config)
 {
     uint32_t residuals = config->banks;
-    bool valid = rewinds_end(config, (uint8_t)(config->history - 1U));
+    bool valid = true;
     for (uint8_t g = 0U; valid && (g < config->generators); g++) {
         valid = generator_valid(config, g);
         residuals += config->residual[g].residuals;
@@ -168,7 +169,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     if ((self == NULL) || (config == NULL) || (memory == NULL)) {
         return HG_E_ARGUMENT;
     }
-    if (!sizes_valid(config)) {
+    if (!counts_valid(config)) {
         return HG_E_CONFIG;
     }
     if (!memory_there(config, memory)) {
@@ -290,6 +291,12 @@ static void derive(hg_detector *self, uint8_t doubt)
     }
 }
 
+/* By how much a radius has grown, from above and finite. */
+static hg_real difference(hg_real now, hg_real before)
+{
+    return hg_real_min(hg_real_mul(now - before, WIDER), HG_REAL_MAX);
+}
+
 /* The radii of one group at a past sample turn out wider, and with them what was derived from them. */
 static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t lag)
 {
@@ -310,12 +317,12 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
         place += predict->width;
     }
     for (uint8_t g = 0U; g < place; g++) {
-        increase[g] = hg_real_mul(row[g] - increase[g], WIDER);
+        increase[g] = difference(row[g], increase[g]);
     }
     if (config->mismatch != NULL) {
         hg_mismatch_grow(config->mismatch, increase, &row[place]);
         for (uint8_t g = place; g < config->width; g++) {
-            increase[g] = hg_real_mul(row[g] - increase[g], WIDER);
+            increase[g] = difference(row[g], increase[g]);
         }
     }
     for (uint8_t g = 0U; (config->zonotope != NULL) && (g < config->generators); g++) {

@@ -179,6 +179,13 @@ static hg_real past(const rig *r, uint8_t lag, uint8_t place)
     return hg_ring_row(&r->self.radii, lag)[place];
 }
 
+/* What has grown later is a little more than what it would have been from the start, and never less. */
+static void assert_grown(double expected, hg_real actual)
+{
+    assert_true((double)actual >= expected);
+    assert_near(expected, actual, 1e-6);
+}
+
 /* ---- start ---- */
 
 static void refuse(const hg_detector_config *config, hg_status expected, int line)
@@ -444,12 +451,12 @@ static void a_rewind_widens_what_was_derived(void **state)
             assert_real(wide, past(&r, lag, (uint8_t)(3U + g))); /* whichever it was, this is true */
         }
         assert_real(SM_HALF, past(&r, lag, 2U));
-        assert_real(mismatch_of(0.5, SM_HALF, 0.0, wide), past(&r, lag, 5U));
+        assert_grown(mismatch_of(0.5, SM_HALF, 0.0, wide), past(&r, lag, 5U));
     }
     for (uint8_t g = 0U; g < 5U; g++) {
         assert_real(SM_HALF, past(&r, 3U, g)); /* the last good frame */
     }
-    assert_real(TINY + SM_HALF + SLEW(2) + (0.25 * SM_HALF) + mismatch_of(0.5, SM_HALF, 0.0, SLEW(2)), r.self.J[0]);
+    assert_grown(TINY + SM_HALF + SLEW(2) + (0.25 * SM_HALF) + mismatch_of(0.5, SM_HALF, 0.0, SLEW(2)), r.self.J[0]);
     /* the prediction relied on nothing that was lost */
     assert_int_equal(HG_PLANT_NONE, silent(&r, 32));
     assert_real(0.25 + 0.125, r.self.value[3]);
@@ -501,7 +508,7 @@ static void a_rewind_of_another_group_grows_the_mismatch_alone(void **state)
     give(&r, 1U, 0, 0, false);
     (void)step(&r);
     assert_real(SLEW(1), past(&r, 1U, 2U));
-    assert_real(before + (0.0625 * (SLEW(1) - promised)), past(&r, 1U, 5U));
+    assert_grown(before + (0.0625 * (SLEW(1) - promised)), past(&r, 1U, 5U));
     for (uint8_t g = 0U; g < 2U; g++) {
         assert_real(SM_HALF, past(&r, 1U, g));
         assert_real(SM_HALF, past(&r, 1U, (uint8_t)(3U + g)));
@@ -793,7 +800,7 @@ static void a_rewind_longer_than_the_ring_ends_with_it(void **state)
     assert_real(SLEW(3), past(&r, 1U, 0U));
     assert_real(SLEW(2), past(&r, 2U, 0U));
     assert_real(mismatch_of(0.0, SM_HALF, 0.0, SLEW(4)), past(&r, 0U, 3U)); /* not taken for the row behind the oldest */
-    assert_real(mismatch_of(0.0, SM_HALF, 0.0, SLEW(2)), past(&r, 2U, 3U));
+    assert_grown(mismatch_of(0.0, SM_HALF, 0.0, SLEW(2)), past(&r, 2U, 3U));
 }
 
 /* ---- the claim ---- */

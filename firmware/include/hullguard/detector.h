@@ -37,7 +37,7 @@ typedef struct {                /* flash: one a model, generated */
     uint8_t                   banks;      /* generators + banks: 1 .. HG_GENERATORS_MAX */
     const hg_bank_config     *bank;       /* [banks] */
     hg_decision_config        decision;   /* of generators and banks, generators first */
-    uint8_t                   history;    /* rows of the ring of radii, 1 .. 255: more than interval_max of any group and the taps of any hull, as many as any bank's window */
+    uint8_t                   history;    /* rows of the ring of radii, 1 .. 255: more than the taps of any hull, with zonotopes than any interval_max, as many as any bank's window */
     uint8_t                   window;     /* rows of the ring of values: the longest window of a bank; 0 without one */
     uint16_t                  residuals;  /* of all generators together, and one for each bank */
     uint16_t                  codes;      /* numbers of integer memory: 2 signals */

@@ -159,7 +159,8 @@ class Tables:
     def history(self) -> int:
         """Rows of the ring of radii."""
         taps = [g.taps + 1 for g in self.generators if g.zonotope is None]
-        return max(taps + [b.window for b in self.banks] + [g.interval_max + 1 for g in self.groups])
+        rewinds = [g.interval_max + 1 for g in self.groups] if any(g.zonotope is not None for g in self.generators) else []
+        return max(taps + rewinds + [b.window for b in self.banks])
 
     @property
     def window(self) -> int:
