@@ -10,6 +10,7 @@ from typing import Any
 from hullguard.campaign.case import Case, Rows
 from hullguard.campaign.summary import CONFIDENCE, summary
 from hullguard.campaign.table import NO_PYARROW, has_parquet, table, write_table
+from hullguard.core.native import LATER
 from hullguard.errors import InputError
 
 ROWS_MAX = 2000  # runs that are listed one by one; of more, the table has them
@@ -69,6 +70,9 @@ def describe(result: dict[str, Any]) -> Iterator[str]:
             delay = "never" if case["delay_mean"] is None else f"mean delay {case['delay_mean']:.2f} samples, longest {case['delay_max']}"
             delay += "" if case.get("limit") is None else f", limit {case['limit']:.2f}"
             yield f"{case['name'] if many else ', '.join(case['faults'])}: found in {case['detected_runs']} of {case['runs']} runs, {delay}"
+            if "isolated_runs" in case:
+                others = ", ".join(f"{name} {count}" for name, count in case["candidates_later"].items())
+                yield f"    always a candidate in {case['true_candidate_runs']}, the only one within {LATER} samples after detection in {case['isolated_runs']}; left by then: {others or 'none'}"
         elif many:
             yield f"{case['name']}: {case['provisional_alarm_runs']} runs with a provisional alarm, {case['false_alarm_runs']} confirmed"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -74,4 +75,22 @@ def _found(parts: Sequence[tuple[Case, Rows]]) -> dict[str, Any]:
         "delay_p90": high,
         "delay_max": int(delays.max()) if len(delays) else None,
         "confirmed_delay_mean": float(sure.mean()) if len(sure) else None,
+        **_isolated(parts),
     }
+
+
+def _isolated(parts: Sequence[tuple[Case, Rows]]) -> dict[str, Any]:
+    """Where each run has one fault that the model names: was it always a candidate, and which were left within LATER samples after detection."""
+    kept, alone, runs = 0, 0, 0
+    left: Counter[str] = Counter()
+    for case, rows in parts:
+        named = [f.name for f in case.setup.model.faults]
+        if len(case.faults) != 1 or case.faults[0].name not in named:
+            return {}
+        bit, found = 1 << named.index(case.faults[0].name), rows["provisional_at"] >= 0
+        later = rows["candidates_later"][found]
+        runs += int(found.sum())
+        kept += int((rows["candidates_always"][found] & bit > 0).sum())
+        alone += int((later == bit).sum())
+        left.update({n: count for i, n in enumerate(named) if (count := int((later >> i & 1).sum()))})
+    return {"true_candidate_runs": kept, "isolated_runs": alone, "candidates_later": dict(left)} if runs else {}

@@ -137,8 +137,12 @@ typedef struct {
     double  margin_settled;   /* the same from the sample on in which even a moving start would be over: the initial state has no part in it */
     double  margin_after;     /* and from the fault on */
     uint32_t candidates;      /* at the first alarm after the fault */
+    uint32_t candidates_later; /* HGH_LATER samples after it, or in the last sample of the alarm before that */
+    uint32_t candidates_always; /* those that were candidates in every sample with a confirmed alarm since the fault; all ones without one */
     int32_t  plant;           /* last state */
 } hgh_result;
+
+#define HGH_LATER 10 /* samples after detection by when a fault should be told from others */
 
 typedef struct hgh_run hgh_run; /* all state in one block */
 

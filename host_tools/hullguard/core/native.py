@@ -28,6 +28,7 @@ FAULT_KINDS = {"bias": 1, "drift": 2, "gain": 3, "freeze": 4, "noise": 5}
 REFERENCE_KINDS = {"rest": 0, "steps": 1, "ramps": 2, "sines": 3, "mixed": 4}
 FOREVER = 2**63 - 1
 REST, MOVING = 1, 0
+LATER = 10  # HGH_LATER: samples after detection by when a fault should be told from others
 
 
 @dataclass(frozen=True)
@@ -443,7 +444,7 @@ class Recording:
 
 RESULT = (
     *("measurement", "closing", "verdicts", "lost", "silent", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
-    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_settled", "margin_after", "candidates", "plant"),
+    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_settled", "margin_after", "candidates", "candidates_later", "candidates_always", "plant"),
 )
 
 

@@ -86,7 +86,7 @@ static int64_t settling(const hg_detector_config *d)
 
 static void forget(hgh_run *self)
 {
-    self->result = (hgh_result){.provisional_at = -1, .confirmed_at = -1};
+    self->result = (hgh_result){.provisional_at = -1, .confirmed_at = -1, .candidates_always = UINT32_MAX};
 }
 
 hgh_run *hgh_run_new(const hgh_run_config *config, uint64_t run)
@@ -264,8 +264,12 @@ static void judge(hgh_run *self, const hg_verdict *verdict)
             result->provisional_at = self->k;
             result->candidates = verdict->candidates;
         }
-        if ((verdict->plant == HG_PLANT_CONFIRMED) && (result->confirmed_at < 0)) {
-            result->confirmed_at = self->k;
+        if (verdict->plant == HG_PLANT_CONFIRMED) {
+            result->confirmed_at = (result->confirmed_at < 0) ? self->k : result->confirmed_at;
+            result->candidates_always &= verdict->candidates;
+        }
+        if ((verdict->plant >= HG_PLANT_PROVISIONAL) && (self->k <= (result->provisional_at + HGH_LATER))) {
+            result->candidates_later = verdict->candidates;
         }
     }
     result->plant = (int32_t)verdict->plant;
