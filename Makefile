@@ -94,7 +94,7 @@ STATIC_LIB  := $(BUILD)/lib/libhullguard_f32.a
 lib: $(SHARED_LIBS) $(STATIC_LIB) ## the C library for the host: build/lib/libhullguard_{f32,f64}.so and libhullguard_f32.a
 
 define shared_lib
-$(eval $(call objects,$(BUILD)/shared-$(1),$(LIB_SRC) $(CORE_SRC),$$(CC) $$(OPTIMISE) -fPIC $(REAL_FLAG_$(1))))
+$(eval $(call objects,$(BUILD)/shared-$(1),$(LIB_SRC) $(CORE_SRC),$$(CC) $$(OPTIMISE) -O3 -fPIC $(REAL_FLAG_$(1))))
 $(BUILD)/lib/libhullguard_$(1).so: $(patsubst %.c,$(BUILD)/shared-$(1)/%.o,$(LIB_SRC) $(CORE_SRC))
 	@mkdir -p $$(@D)
 	$$(Q)$$(CC) -shared -Wl,--no-undefined -o $$@ $$^ -lm
