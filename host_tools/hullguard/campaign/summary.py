@@ -80,12 +80,12 @@ def _found(parts: Sequence[tuple[Case, Rows]]) -> dict[str, Any]:
 
 
 def _isolated(parts: Sequence[tuple[Case, Rows]]) -> dict[str, Any]:
-    """Where each run has one fault that the model names: was it always a candidate, and which were left within LATER samples after detection."""
+    """Where a detector isolates, and each run has one fault that the model names: was it always a candidate, and which were left within LATER samples after detection."""
     kept, alone, runs = 0, 0, 0
     left: Counter[str] = Counter()
     for case, rows in parts:
         named = [f.name for f in case.setup.model.faults]
-        if len(case.faults) != 1 or case.faults[0].name not in named:
+        if case.setup.model.detector.isolation is None or len(case.faults) != 1 or case.faults[0].name not in named:
             return {}
         bit, found = 1 << named.index(case.faults[0].name), rows["provisional_at"] >= 0
         later = rows["candidates_later"][found]
