@@ -284,7 +284,7 @@ def select(delays: NDArray[np.float32], training: Training, size: int) -> list[i
     cost, stage = _Cost(delays, training, FIRST_LEAST), FIRST_STAGE
     # An exchange ends where no single one helps, which depends on the start. The first stage, on which all others stand, starts with the best of every class.
     starts = dict.fromkeys(int(i) for i in [cost([]).argmin(), *cost.means([]).argmin(0)])
-    chosen = min((_stage([start], 0, min(stage, size), cost) for start in starts), key=cost.reached)
+    chosen = min((_stage([start], 0, min(stage, size), cost) for start in starts), key=lambda end: (cost.reached(end), len(end)))
     cost = _Cost(delays, training, LEAST)
     while len(chosen) == stage < size:
         stage *= 2
