@@ -9,7 +9,22 @@ import pytest
 from host_support import SEED, Models
 from hullguard.campaign.tasks import Emulator
 from hullguard.design.arith import nearest32
-from hullguard.design.bank import BankSpec, alarm_delay, candidates, cases, collect, evaluate, first_alarms, make_bank, project, select, shortened, stored_weight, usual_scale
+from hullguard.design.bank import (
+    BankSpec,
+    Training,
+    alarm_delay,
+    candidates,
+    cases,
+    collect,
+    evaluate,
+    first_alarms,
+    make_bank,
+    project,
+    select,
+    shortened,
+    stored_weight,
+    usual_scale,
+)
 from hullguard.design.bank_table import bank_table, moved
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.design import Design, usual_radius
@@ -20,6 +35,7 @@ from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.schema import Model, Reference
 from hullguard.model.table import Array
+from numpy.typing import NDArray
 from window_support import random_designs, simulate
 
 REST = Reference("rest", 0.0, 1)
@@ -182,7 +198,8 @@ def test_the_same_spec_gives_the_same_bank_with_any_number_of_workers(platoon: D
 
 
 def test_a_small_bank_is_the_beginning_of_a_large_one(platoon: Design) -> None:
-    training = collect(platoon, replace(SPEC, runs=2))
+    # So many runs that eight certificates do not reach the limit in all of them.
+    training = collect(platoon, replace(SPEC, runs=8))
     model = platoon.model
     delays = first_alarms(model, window_form(model.plant, 30), training.weight, training)
     large = select(delays, training, 16)
@@ -193,6 +210,18 @@ def test_a_small_bank_is_the_beginning_of_a_large_one(platoon: Design) -> None:
     assert means == sorted(means, reverse=True)
     assert means[3] < means[0]
     assert np.all(delays.min(0) >= training.limit)
+
+
+def drawn(delays: list[list[int]], limit: float) -> tuple[NDArray[np.float32], Training]:
+    """Delays of candidates, and a training of two runs a class."""
+    runs, none = len(delays[0]), np.zeros((0, 0, 0))
+    return np.array(delays, np.float32), Training(np.repeat(np.arange(float(runs // 2)), 2), np.full(runs, limit), none, none, none)
+
+
+def test_the_choice_serves_the_worst_class_first() -> None:
+    assert select(*drawn([[10, 10, 14, 14], [13, 13, 13, 13], [13, 13, 13, 14]], 10.0), 1) == [1]
+    # Beside those that are as early as the limit in one class each no other helps.
+    assert sorted(select(*drawn([[10, 10, 40, 40], [40, 40, 10, 10], [11, 11, 11, 11], [10, 10, 40, 40]], 10.0), 3)) == [0, 1]
 
 
 def test_every_training_run_has_a_number_of_its_own() -> None:

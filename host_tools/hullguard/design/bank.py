@@ -2,8 +2,9 @@
 
 A run's limit is the first sample with no explanation left; the dual there, and those of the samples after it, which noise moves less, are candidates.
 A candidate is projected on its own support onto the left null space of what it must not see, and scaled to a threshold of 1 at usual radii. The
-choice looks at delays over limit, class by class (a class is one fault at one size): what exceeds the limit, relative to it, squared, so that no class
-is left behind, and relative to at least CAP samples, so that limits of one sample do not dominate. All numbers that leave here are rounded.
+choice looks at delays over limit, class by class (a class is one fault at one size): what exceeds the limit, relative to it, to a high power, so that no
+class is left behind. The first few certificates take the limit as it is; those after them take it as LEAST samples or more, so that limits of one or two
+do not dominate. All numbers that leave here are rounded.
 """
 
 from __future__ import annotations
@@ -34,9 +35,11 @@ RUNS_TASK = 10
 DUST = 1e-6  # share of a dual below which the projection has left nothing of it
 SUPPORT = 1e-9  # of a dual's largest entry: what is below is the solver's dust
 DECOUPLED = 1e-7  # what may be left of O and Gamma after the projection, for a certificate of threshold 1
-CAP = 1.5  # samples
-WORTH = 1e-6  # share of the cost that a certificate, or an exchange, must save
-POOL = 2000  # candidates
+POWER = 8  # of what exceeds a limit: almost the worst class alone
+FIRST_LEAST = 1.0  # samples that a limit counts as at least, in the first stage
+LEAST = 5.0  # samples, in the stages after it
+WORTH = 1e-9  # share of the cost that a certificate, or an exchange, must save
+POOL = 6000  # candidates
 FIRST_STAGE = 4  # certificates: a bank of 4, 8, 16 .. is as good as the choice can make it, each the beginning of the next
 
 
@@ -231,13 +234,13 @@ def project(w: Array, basis: Array) -> Array:
     return out
 
 
-def first_alarms(model: Model, form: WindowForm, weight: Array, training: Training) -> Array:
+def first_alarms(model: Model, form: WindowForm, weight: Array, training: Training) -> NDArray[np.float32]:
     """Delay of each certificate in each run: certificates x runs, the horizon where it never alarms."""
     # Single precision is good enough for a choice, and twice as fast.
     full = full_weight(model, form, weight).reshape(len(weight), -1).astype(np.float32)
     size, own = np.abs(full), np.abs(weight.reshape(len(weight), -1) @ form.Md).sum(1)[:, None].astype(np.float32)
     horizon = training.value.shape[1] - form.window + 1
-    delays = np.full((len(weight), training.runs), float(horizon))
+    delays = np.full((len(weight), training.runs), horizon, dtype=np.float32)
     for i in range(training.runs):
         value, radius = (windows(a[i].astype(np.float32), form.window) for a in (training.value, training.radius))
         alarm = np.abs(full @ value.T) > size @ radius.T + own
@@ -251,33 +254,58 @@ def windows(rows: NDArray[Real], window: int) -> NDArray[Real]:
     return np.ascontiguousarray(view.transpose(0, 2, 1)).reshape(len(view), -1)
 
 
-def select(delays: Array, training: Training, size: int) -> list[int]:
-    """At most `size` certificates in the order of their choice, fewer where no other helps: greedy, then exchanged one by one, in stages of 4, 8, 16 .."""
-    classes = np.unique(training.group)
-    share = np.array([(training.group == c) / np.sum(training.group == c) for c in classes]).T  # runs x classes
-    limit = (training.limit @ share)[None]
+class _Cost:
+    """What the choice makes small: delay over limit of the classes, relative to the limit or to `least` samples if that is more, to the power POWER, added up."""
 
-    def cost(others: Sequence[int]) -> Array:
-        """Of every candidate, added to the others."""
-        best = delays if not others else np.minimum(delays, delays[list(others)].min(0))
-        return np.asarray((((best @ share - limit) / np.maximum(limit, CAP)) ** 2).sum(1))
+    def __init__(self, delays: NDArray[np.float32], training: Training, least: float) -> None:
+        classes, count = np.unique(training.group, return_counts=True)
+        # Sums of small whole numbers are exact in single precision: no order of addition, and no number of threads, decides a choice.
+        self._delays, self._member = delays, (training.group[:, None] == classes).astype(np.float32)
+        self._runs, self._limit = count, training.limit @ self._member / count
+        self._relative = np.maximum(self._limit, least)
 
-    chosen = [int(cost([]).argmin())]
-    reached, stage = float(cost([]).min()), FIRST_STAGE
-    while len(chosen) < size:
-        fixed = 0 if stage == FIRST_STAGE else len(chosen)
-        while len(chosen) < min(stage, size):
-            costs = cost(chosen)
-            if costs.min() >= reached * (1 - WORTH):
-                return chosen
-            chosen.append(int(costs.argmin()))
-            reached = float(costs.min())
-        _exchange(chosen, fixed, cost)
-        reached, stage = float(cost(chosen[:-1])[chosen[-1]]), 2 * stage
+    def means(self, others: Sequence[int]) -> Array:
+        """Delay of every candidate added to the others, class by class: candidates x classes, samples."""
+        best = np.minimum(self._delays, self._delays[list(others)].min(0)) if others else self._delays
+        return np.asarray((best @ self._member).astype(np.float64) / self._runs)
+
+    def __call__(self, others: Sequence[int]) -> Array:
+        """Of every candidate added to the others."""
+        excess = (self.means(others) - self._limit) / self._relative
+        return np.asarray((excess**POWER).sum(1))
+
+    def reached(self, chosen: Sequence[int]) -> float:
+        """Of the chosen."""
+        return float(self(chosen[:-1])[chosen[-1]])
+
+
+def select(delays: NDArray[np.float32], training: Training, size: int) -> list[int]:
+    """At most `size` certificates in the order of their choice, fewer where no other helps: in stages of 4, 8, 16 .., each greedy, then exchanged one by one."""
+    cost, stage = _Cost(delays, training, FIRST_LEAST), FIRST_STAGE
+    # An exchange ends where no single one helps, which depends on the start. The first stage, on which all others stand, starts with the best of every class.
+    starts = dict.fromkeys(int(i) for i in [cost([]).argmin(), *cost.means([]).argmin(0)])
+    chosen = min((_stage([start], 0, min(stage, size), cost) for start in starts), key=lambda end: (cost.reached(end), len(end)))
+    cost = _Cost(delays, training, LEAST)
+    while len(chosen) == stage < size:
+        stage *= 2
+        chosen = _stage(chosen, len(chosen), min(stage, size), cost)
     return chosen
 
 
-def _exchange(chosen: list[int], fixed: int, cost: Callable[[Sequence[int]], Array]) -> None:
+def _stage(begun: list[int], fixed: int, size: int, cost: _Cost) -> list[int]:
+    """Greedily more certificates while they help, then those behind the first `fixed` exchanged."""
+    chosen, reached = list(begun), cost.reached(begun)
+    while len(chosen) < size:
+        costs = cost(chosen)
+        if costs.min() >= reached * (1 - WORTH):
+            break
+        chosen.append(int(costs.argmin()))
+        reached = float(costs.min())
+    _exchange(chosen, fixed, cost)
+    return chosen
+
+
+def _exchange(chosen: list[int], fixed: int, cost: _Cost) -> None:
     """Replace certificates behind the first `fixed` by better ones until none is."""
     better = True
     while better:
