@@ -39,6 +39,7 @@ POWER = 8  # of what exceeds a limit: almost the worst class alone
 FIRST_LEAST = 1.0  # samples that a limit counts as at least, in the first stage
 LEAST = 5.0  # samples, in the stages after it
 WORTH = 1e-9  # share of the cost that a certificate, or an exchange, must save
+TIE = 1e-6  # share by which weights may differ that count as equally large
 POOL = 6000  # candidates
 FIRST_STAGE = 4  # certificates: a bank of 4, 8, 16 .. is as good as the choice can make it, each the beginning of the next
 
@@ -212,8 +213,9 @@ def candidates(model: Model, form: WindowForm, duals: Array, hypothesis: int | N
         return np.zeros((0, form.window, model.plant.m))
     made /= usual_threshold(model, form, made)[:, None, None]
     flat = made.reshape(len(made), -1)
-    # r and -r are the same certificate: the largest weight is positive.
-    flat *= np.sign(flat[np.arange(len(flat)), np.abs(flat).argmax(1)])[:, None]
+    # r and -r are the same certificate: the first of its largest weights is positive, and as large as another is what rounding cannot tell apart.
+    size = np.abs(flat)
+    flat *= np.sign(flat[np.arange(len(flat)), (size >= (1 - TIE) * size.max(1, keepdims=True)).argmax(1)])[:, None]
     kept = flat[np.abs(flat @ basis).max(1) <= DECOUPLED * np.abs(basis).max()]
     rounded = stored_weight(kept).reshape(-1, form.window, model.plant.m)
     _, first = np.unique(rounded.round(5), axis=0, return_index=True)
