@@ -36,7 +36,7 @@ from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_ove
 from hullguard.model.schema import FAULTS_MAX
 from hullguard.plant.detect import Detector, from_bus, from_log
 from hullguard.plant.recording import read_recording
-from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, summary, write_files
+from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, candidate_names, spoken, summary, write_files
 
 INSIDE = "HULLGUARD_INSIDE"  # set for the copy of a command that runs where with-vcan made a bus
 NODE_START_S = 20.0
@@ -279,7 +279,8 @@ def _loop(args: argparse.Namespace, made: Design, source: Source, samples: int, 
         def watch(k: int, trace: Trace) -> None:
             ratios = [abs(r) / J for r, J in zip(trace.r[-1], trace.J[-1], strict=True)]
             v = trace.verdict[-1]
-            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, dict(zip((g.name for g in made.tables.groups), v.bus, strict=True)), trace.counts["measurement"])
+            bus = dict(zip((g.name for g in made.tables.groups), v.bus, strict=True))
+            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, bus, trace.counts["measurement"], candidate_names(made, v.candidates))
 
         return run.samples(source, samples, watch), run.mismatch
 
@@ -379,9 +380,16 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
             say(args, f"{began}, not found")
         else:
             sure = "confirmed at once" if f["confirmed_at"] == f["detected_at"] else f"confirmed at {f['confirmed_at']}" if f["confirmed_at"] is not None else "not confirmed"
-            say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}")
+            say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}" + _narrowed(f))
     alarms = result["false_alarms"]
     say(args, f"false alarms before the fault: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J {result['margin_max']:.3f}")
+
+
+def _narrowed(f: dict[str, Any]) -> str:
+    """What is left of a fault's candidates, where later alarms have excluded some."""
+    if f["narrowed_at"] is None or f["narrowed_to"] == f["candidates"]:
+        return ""
+    return f"; from sample {f['narrowed_at']} on {', '.join(f['narrowed_to']) or 'no single one of them'}"
 
 
 def _expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
@@ -440,16 +448,17 @@ def signalled() -> Iterator[Callable[[], bool]]:
 
 def run_detect(args: argparse.Namespace) -> int:
     """`hullguard detect`."""
+    from hullguard.report.live import may_be
+
     _, made = prepared(args)
     native = Native(library(args.real), made.tables)
     changes: list[dict[str, Any]] = []
 
     def watch(v: Verdict) -> None:
-        bus = dict(zip((g.name for g in native.tables.groups), v.bus, strict=True))
-        if not changes or changes[-1]["plant"] != v.plant or changes[-1]["bus"] != bus:
-            changes.append({"k": v.k, "plant": v.plant, "bus": bus})
-            names = [x.name for i, x in enumerate(made.model.faults) if v.candidates >> i & 1]
-            say(args, f"k {v.k}: plant {v.plant}" + (f", may be {', '.join(names)}" if names else "") + f"; bus {', '.join(f'{n} {s}' for n, s in bus.items())}")
+        row = spoken(made, v)
+        if not changes or {**changes[-1], "k": v.k} != row:
+            changes.append(row)
+            say(args, f"k {v.k}: plant {v.plant}{may_be(v.plant, row['candidates'], bool(made.model.faults))}; bus {', '.join(f'{n} {s}' for n, s in row['bus'].items())}")
 
     start = REST if args.rest else MOVING
     if args.log:
