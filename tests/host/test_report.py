@@ -182,6 +182,7 @@ def make_run(
         "model": "platoon",
         "model_hash": "1f3a99c0",
         "real": "f32",
+        "threshold": "exact",
         "known_faults": [first],
         "judges": [{"name": f"observer {g + 1}", "kind": "observer", "residuals": residuals} for g in range(generators)],
         "bus": "in process",

@@ -24,6 +24,7 @@ from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, P
 from hullguard.design.window import Varying
 from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
+from hullguard.model.detector import PUBLISHED
 from hullguard.model.plant import Feedback
 from hullguard.model.schema import GENERATORS_MAX, Model, Observer
 from hullguard.model.table import Array
@@ -356,7 +357,7 @@ def _zonotope(
     spec = model.detector
     if spec.threshold == "exact":
         return None
-    published = spec.threshold == "zonotope_published"
+    published = spec.threshold == PUBLISHED
     more = np.eye(model.plant.n)[:, list(derived.states)]
     return zonotope.build(linear, T, sub, ranges, radius, exact, signal + derived.uncertain, spec.columns, TRUNCATE if published else BALL, where, published, more)
 

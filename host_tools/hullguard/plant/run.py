@@ -260,6 +260,7 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
         "model_hash": f"{tables.hash:08x}",
         "real": native.library.real,
         "known_faults": [f.name for f in model.faults],
+        "threshold": model.detector.threshold,
         "judges": [asdict(j) for j in judges(design)],
         **facts,
         "bitrate": model.bitrate_bps,

@@ -359,7 +359,7 @@ def read_run(directory: Path) -> Run:
         for s in [name.removesuffix(".value") for name in column if name.endswith(".value")]
     )
     groups, verdicts = _groups(top, column, where), _verdicts(top)
-    for key in ("model", "model_hash", "real", "bus", "scenario", "seed"):
+    for key in ("model", "model_hash", "real", "bus", "scenario", "seed", "threshold"):
         top.raw(key)
     for key in ("measurement", "periodic", "total", "bits", "bits_periodic", "load_mean", "load_p99", "load_bound"):
         top.object("frames").number(key)

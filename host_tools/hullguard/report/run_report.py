@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from hullguard.design.judges import BANK
 from hullguard.errors import InputError
+from hullguard.model.detector import PUBLISHED
 from hullguard.report import published
 from hullguard.report import run_figures as draw
 from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
@@ -34,6 +35,10 @@ GUARANTEE = (
     "states, and no corrupted frame passes its end-to-end check, no residual can exceed its threshold, whatever is sent late, lost or not at all; so a "
     "confirmed fault means that the plant or one of these bounds is broken."
 )
+UNSOUND = (
+    "Not guaranteed in this run: that there is no false alarm. The threshold is the publication's zonotope, which drops generators instead of covering them and so can be "
+    "smaller than what a healthy plant can show. It is there for comparison; detector.threshold exact or zonotope gives the guarantee."
+)
 LIMITS = (
     "Not guaranteed: that every fault is found (one that stays below the thresholds is not), or that frames are authentic: the check protects against errors, "
     "not against an attacker."
@@ -45,6 +50,7 @@ CANDIDATES = (
 )
 HYPOTHESES = "Above its threshold “not X” has shown that no course of fault X explains what was received."
 MOVING = "The threshold moves: it is the largest value a healthy plant can show, given what the detector knows."
+MOVING_PUBLISHED = "The threshold moves with what the detector knows."
 BAND = "The detector works on values and radii only: the true reading has to lie in the band. A sensor's fault is in the reading that is sent, and in the band."
 
 
@@ -91,7 +97,7 @@ def _body(run: Run) -> Iterator[str]:
     if hidden:
         whose = f" ({plural(judges, 'generator')} as a whole)" if judges else ""
         left = f" {plural(hidden, 'residual')} not drawn here{whose}: those drawn alarmed first or came closest to their thresholds."
-    yield f"<p>A fault is declared when a residual leaves its threshold. {MOVING}{esc(left)}</p>"
+    yield f"<p>A fault is declared when a residual leaves its threshold. {MOVING_PUBLISHED if run.info['threshold'] == PUBLISHED else MOVING}{esc(left)}</p>"
     zoom = draw.close_up(run)
     if zoom:
         w, fault = zoom
@@ -232,7 +238,7 @@ def _summary(run: Run) -> Iterator[str]:
     yield '<div class="tiles">' + "".join(_tiles(run)) + "</div>"
     if run.faults:
         yield _fault_table(run)
-    yield f'<aside><p>{esc(GUARANTEE)}</p><p class="note">{esc(LIMITS)}</p></aside>'
+    yield f'<aside><p>{esc(UNSOUND if info["threshold"] == PUBLISHED else GUARANTEE)}</p><p class="note">{esc(LIMITS)}</p></aside>'
 
 
 def _tiles(run: Run) -> Iterator[str]:
@@ -281,10 +287,14 @@ def _fault_table(run: Run) -> str:
         found: object = Cell("not found", "bad") if f.detected is None else f.detected
         delay = delay_of(f)
         until = "end" if f.end is None else f.end
-        seconds = None if delay is None else delay * run.sample_time_s
-        left = "–" if f.narrowed_at is None or f.narrowed_to == f.candidates else f"{', '.join(f.narrowed_to) or draw.NO_SINGLE} (k = {f.narrowed_at})"
-        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, seconds, ", ".join(f.candidates) or "–", left])
-    return table(["", "fault", "#start", "#until", "#detected", "#confirmed", "#delay (samples)", "#delay (s)", "candidates at first", "narrowed to"], rows)
+        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, _named(f)])
+    return table(["", "fault", "#start", "#until", "#detected", "#confirmed", "#delay (samples)", "#delay (s)", "candidates named"], rows)
+
+
+def _named(f: FaultRun) -> str:
+    """Candidates when the fault was detected, and what later alarms left of them."""
+    first = ", ".join(f.candidates) or "–"
+    return first if f.narrowed_at is None or f.narrowed_to == f.candidates else f"{first}; from k = {f.narrowed_at} {', '.join(f.narrowed_to) or draw.NO_SINGLE}"
 
 
 # --- tables --------------------------------------------------------------------------------------------------------------
