@@ -31,6 +31,7 @@ from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native, Plant, Recording, Verdict
 from hullguard.design import store
 from hullguard.design.design import Design, design, finish, stored_for
+from hullguard.design.isolation import Pair, isolability
 from hullguard.errors import BusError, ExpectationError, InputError
 from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_override
 from hullguard.model.schema import FAULTS_MAX
@@ -40,6 +41,7 @@ from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source
 
 INSIDE = "HULLGUARD_INSIDE"  # set for the copy of a command that runs where with-vcan made a bus
 NODE_START_S = 20.0
+ISOLABILITY_WINDOW = 30  # samples, for a model that has no bank
 
 
 def say(args: argparse.Namespace, text: str) -> None:
@@ -135,9 +137,20 @@ def _by_fault(made: Design, faults: Sequence[int], values: Any) -> dict[str, flo
     return {made.model.faults[f].name: (float(v) if np.isfinite(v) else None) for f, v in zip(faults, values, strict=True)}
 
 
+def _isolability(args: argparse.Namespace, made: Design) -> list[Pair]:
+    """Which faults can be told apart: where the model isolates, or on demand, for it takes a linear programme a pair and sample."""
+    wish = made.model.detector.isolation or (made.model.detector.bank if args.isolability else None)
+    if wish is None and not args.isolability:
+        return []
+    with progress(args, "isolability") as tick:
+        return isolability(made.model, wish.window if wish else ISOLABILITY_WINDOW, tuple(range(len(made.model.faults))), tick=tick)
+
+
 def run_design(args: argparse.Namespace) -> int:
     """`hullguard design`."""
     from hullguard.codegen import write_all
+    from hullguard.design.bank_facts import bank_facts
+    from hullguard.report.design_banks import as_json
     from hullguard.report.design_report import write_design_report
 
     overrides = dict(parse_override(text) for text in args.set)
@@ -157,19 +170,23 @@ def run_design(args: argparse.Namespace) -> int:
         store.write(out / f"{model.path.stem}.design.toml", model.path.stem, stored)
     write_all(made, out)
     report = out / f"{model.name}.html"
-    write_design_report(made, report)
+    pairs = _isolability(args, made)
+    write_design_report(made, report, pairs)
     for c in made.checks:
         say(args, f"  {c.name}: {c.value:.4g} (limit {c.limit:.4g})")
     for i, g in enumerate(made.generators):
         found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
         say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
+    for f in bank_facts(made):
+        found = ", ".join(f"{made.model.faults[i].name} {v:.3g}" for i, v in zip(f.faults, f.smallest[:, 0], strict=True))
+        say(args, f"  {f.name}: {f.table.certificates} certificates over {f.table.window} samples, smallest fault within {f.within[0]} samples: {found}")
     say(args, f"model {model.name}, hash {made.tables.hash:08x}: tables, DBC and report in {out}" + ("" if own else f"; search kept in {beside.name}" if not overrides else ""))
     emit(args, {
         "model": model.name, "model_hash": f"{made.tables.hash:08x}", "out": str(out), "generators": matrices(made),
         "slews": {s.name: stored.slew[i].tolist() for i, s in enumerate(model.signals)},
         "state_range": stored.state_range.tolist(),
         "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "passed": c.passed} for c in made.checks],
-        "load_bound": made.load_bound, "reused": own,
+        "load_bound": made.load_bound, "reused": own, **as_json(made, pairs),
     })  # fmt: skip
     return 0
 

@@ -62,6 +62,7 @@ class Design:
     tables: Tables
     checks: tuple[Check, ...]
     load_bound: float
+    usual: Array  # radii of the whole vector most of the time
 
     @property
     def judges(self) -> list[str]:
@@ -260,7 +261,7 @@ def finish(model: Model, stored: Stored) -> Design:
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
-    return Design(model, stored, generators, tables, tuple(checks), bound)
+    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual)
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:

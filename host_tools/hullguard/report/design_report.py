@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,8 +14,12 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from hullguard.bus.bits import worst_bits
 from hullguard.design.design import Design, Generator
+from hullguard.design.isolation import Pair
+from hullguard.design.judges import BANK, HYPOTHESIS, judges
+from hullguard.design.tables import GeneratorTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
 LINES = (BLUE, RED, GREEN, PINK, AMBER, SKY, MUTED, INK)
@@ -27,17 +31,17 @@ SMALLEST = "Smallest lasting step that reaches the steady threshold, in the sign
 SLEWS_MAX = 6  # columns of the table of slews
 
 
-def write_design_report(design: Design, path: Path) -> None:
-    """Write the report of a finished design."""
+def write_design_report(design: Design, path: Path, pairs: Sequence[Pair] = ()) -> None:
+    """Write the report of a finished design. `pairs`: which faults can be told apart, where that was looked into."""
     with mpl.rc_context(RC):
-        text = page(f"Design of {design.model.name}", _body(design))
+        text = page(f"Design of {design.model.name}", _body(design, pairs))
     try:
         path.write_bytes(text.encode())
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _body(design: Design) -> Iterator[str]:
+def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
     yield from _summary(design)
     yield "<h2>Plant and signals</h2>"
     yield _signals(design)
@@ -57,6 +61,10 @@ def _body(design: Design) -> Iterator[str]:
         yield from _generator(design, i, g)
         if folded:
             yield "</details>"
+    yield from banks_section(design)
+    yield from isolability_section(design, pairs)
+    yield from derived_section(design)
+    yield from cost_section(design)
     yield "<h2>Checks</h2>"
     yield _checks(design)
 
@@ -71,8 +79,7 @@ def _summary(design: Design) -> Iterator[str]:
         f'<p class="note">{plural(model.plant.n, "state")}, {plural(model.plant.m, "output")}, {plural(model.plant.p, "input")}; {num(model.sample_time_s * 1000)} ms; '
         f"{num(model.bitrate_bps / 1000)} kbit/s; model hash <code>{design.tables.hash:08x}</code></p>"
     )
-    residuals = design.tables.residuals
-    yield f'<p class="lead">{plural(len(design.generators), "residual generator")} with {plural(residuals, "residual")}; {passed} of {len(design.checks)} checks passed.</p>'
+    yield f'<p class="lead">{esc(_judging(design))}; {passed} of {len(design.checks)} checks passed.</p>'
     used = [g for g in design.generators if g.filter.regularised > 0]
     if used:
         names = ", ".join(str(i + 1) for i, g in enumerate(design.generators) if g.filter.regularised > 0)
@@ -84,15 +91,20 @@ def _summary(design: Design) -> Iterator[str]:
     if best:
         name, size = max(best.items(), key=lambda kv: kv[1])
         tiles.append(tile("hardest fault asked for", num(size), f"{name}: smallest size that is found"))
-    tiles.append(
-        tile(
-            "ready after",
-            f"{max(g.tables.ready_rest for g in design.generators)} samples",
-            f"from rest; {max(g.tables.ready_moving for g in design.generators)} in motion",
-        )
-    )
+    full = max((b.window for b in design.tables.banks), default=0)
+    rest, moving = (max([full, *(ready(g) for g in design.tables.generators)]) for ready in (_ready_rest, _ready_moving))
+    tiles.append(tile("ready after", f"{rest} samples", f"from rest; {moving} in motion"))
     tiles.append(tile("longest history", f"{design.tables.history} samples", "of radii, in RAM"))
     yield '<div class="tiles">' + "".join(tiles) + "</div>"
+
+
+def _judging(design: Design) -> str:
+    """What the detector is made of, in words."""
+    residuals = sum(len(g.output) for g in design.tables.generators)
+    parts = [f"{plural(len(design.generators), 'residual generator')} with {plural(residuals, 'residual')}"] if design.generators else []
+    parts += [f"a {j.name} certificates" for j in judges(design) if j.kind == BANK]
+    isolating = sum(j.kind == HYPOTHESIS for j in judges(design))
+    return ", ".join([*parts, *([f"{plural(isolating, 'bank')} for isolation"] if isolating else [])])
 
 
 def _smallest(design: Design) -> dict[str, float]:
@@ -103,6 +115,14 @@ def _smallest(design: Design) -> dict[str, float]:
             name = design.model.faults[f].name
             best[name] = min(best.get(name, np.inf), float(size))
     return best
+
+
+def _ready_rest(g: GeneratorTable) -> int:
+    return g.ready_rest if g.zonotope is None else g.zonotope.ready_rest
+
+
+def _ready_moving(g: GeneratorTable) -> int:
+    return g.ready_moving if g.zonotope is None else g.zonotope.ready_moving
 
 
 # --- tables of the model ---------------------------------------------------------------------------------------------------
@@ -210,6 +230,7 @@ def _faults(design: Design) -> str:
     best = _smallest(design)
     for i, f in enumerate(design.model.faults):
         seen = [str(k + 1) for k, t in enumerate(design.tables.generators) if t.faults >> i & 1]
+        seen += [j.name for j, t in zip(judges(design), design.tables.judging, strict=True) if j.kind == BANK and t.faults >> i & 1]
         asked = best.get(f.name)
         rows.append([f.name, f.type, design.model.signals[f.signal].name, ", ".join(seen) or Cell("none", "bad"), "not asked for" if asked is None else num(asked)])
     return (
