@@ -22,8 +22,8 @@ BANK_INTRO = (
 )
 ISOLATING_INTRO = "A bank “not X” holds certificates that no course of fault X moves. When one alarms, X alone is no explanation any more."
 SMALLEST = (
-    "Smallest constant fault, in its signal's unit, whose residual reaches its threshold at the usual radii within so many samples of its start, whatever the "
-    "disturbances add or take. A dash: no certificate of the bank sees the fault."
+    "Smallest constant fault, in its signal's unit, whose response alone reaches a certificate's threshold at the usual radii within so many samples of its "
+    "start. A dash: none of the bank's certificates sees the fault until then."
 )
 
 
@@ -37,7 +37,7 @@ def banks_section(design: Design) -> Iterator[str]:
     yield _sizes(facts)
     for learnt in _learnt(design, facts):
         yield f'<p class="note">{esc(learnt)}</p>'
-    yield _sees(design.model, facts)
+    yield from _sees(design.model, facts)
 
 
 def _sizes(facts: Sequence[BankFacts]) -> str:
@@ -61,12 +61,22 @@ def _learnt(design: Design, facts: Sequence[BankFacts]) -> Iterator[str]:
         yield f"{whom} from {plural(s.runs, 'run')} of each fault, size, sign and way of driving: {faults}; sizes {sizes}; {ways}; seed {s.seed}; {sum(f.runs for f in mine)} runs."
 
 
-def _sees(model: Model, facts: Sequence[BankFacts]) -> str:
-    rows = []
+def _sees(model: Model, facts: Sequence[BankFacts]) -> Iterator[str]:
+    """Of the bank for detection at several horizons, of those for isolation at the shortest."""
     for f in facts:
-        for place, fault in enumerate(f.faults):
-            rows.append([f.name if place == 0 else "", model.faults[fault].name, *[float(x) if np.isfinite(x) else None for x in f.smallest[place]]])
-    return table(["bank", "fault", *[f"#within {w} samples" for w in facts[0].within]], rows, SMALLEST)
+        if f.stored.hypothesis is None:
+            rows = [[model.faults[fault].name, *[_size(x) for x in f.smallest[place]]] for place, fault in enumerate(f.faults)]
+            yield table([f"fault seen by the {f.name}", *[f"#within {w} samples" for w in f.within]], rows, SMALLEST)
+    isolating = [f for f in facts if f.stored.hypothesis is not None]
+    if isolating:
+        faults = sorted({i for f in isolating for i in f.faults})
+        seen = [{fault: f.smallest[place, 0] for place, fault in enumerate(f.faults)} for f in isolating]
+        rows = [[model.faults[i].name, *[_size(s[i]) if i in s else None for s in seen]] for i in faults]
+        yield table(["fault present", *[f"#{f.name}" for f in isolating]], rows, f"The same of the banks for isolation, within {isolating[0].within[0]} samples.")
+
+
+def _size(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None
 
 
 # --- isolability ---------------------------------------------------------------------------------------------------------
@@ -76,13 +86,13 @@ def isolability_section(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
     """Which fault can be told from which, as a square, and why not where not."""
     if not pairs:
         return
-    faults = list(dict.fromkeys(p.truth for p in pairs))
+    faults = sorted({p.truth for p in pairs})
     names, by = [f.name for f in design.model.faults], {(p.truth, p.hypothesis): p for p in pairs}
     yield "<h2>Which faults can be told apart</h2>"
     rows = [[names[i], *[_cell(by.get((i, j))) for j in faults]] for i in faults]
     caption = (
         f"A row a fault that is there, a column a hypothesis: the smallest constant fault, in its signal's unit, that no course of the hypothesis explains within {WITHIN} samples, "
-        "at the usual radii. It is the limit of any sound detector; what the banks of this one reach stands above."
+        "at the usual radii. It is the limit of any sound detector that looks at so long a window."
     )
     yield table(["fault present", *[f"#not {names[j]}" for j in faults]], rows, caption)
     reasons = [p for p in pairs if p.reason]
@@ -145,13 +155,23 @@ def _prediction(design: Design) -> Iterator[str]:
     )
 
 
+def _moved(design: Design) -> tuple[int, ...]:
+    """The states that uncertain parameters move, in the order of their radii."""
+    return mismatch_table(design.model, design.stored.state_range)[1] if design.tables.mismatch is not None else ()
+
+
+def uncertain_names(design: Design) -> list[str]:
+    """What the radii are called that stand for uncertain parameters."""
+    return [f"uncertainty of {design.model.plant.states[i]}" for i in _moved(design)]
+
+
 def _mismatch(design: Design) -> Iterator[str]:
     found = design.tables.mismatch
     if found is None:
         return
     model = design.model
     yield "<h3>Uncertain parameters</h3>"
-    _, states = mismatch_table(model, design.stored.state_range)
+    states = _moved(design)
     usual = design.usual[len(design.usual) - len(states) :]
     rows = []
     for i, state in enumerate(states):

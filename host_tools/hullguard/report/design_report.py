@@ -19,7 +19,7 @@ from hullguard.design.judges import BANK, HYPOTHESIS, judges
 from hullguard.design.tables import GeneratorTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
-from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section
+from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section, uncertain_names
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
 LINES = (BLUE, RED, GREEN, PINK, AMBER, SKY, MUTED, INK)
@@ -276,8 +276,9 @@ def _generator(design: Design, i: int, g: Generator) -> Iterator[str]:
     if g.filter.regularised > 0:
         yield f"<p><b>The factorisation was singular and is regularised</b>: noise of size {num(g.filter.regularised)} that no one claims was added to each row of Fb.</p>"
     yield _search(design, g)
-    yield _composition(names, g)
-    yield picture(_response_figure(g, names), f"h{i + 1}", f"Threshold of generator {i + 1}", _response_caption(g, names))
+    wide = names + uncertain_names(design)
+    yield _composition(wide, g)
+    yield picture(_response_figure(g, wide), f"h{i + 1}", f"Threshold of generator {i + 1}", _response_caption(g))
     yield picture(_bias_figure(g), f"p{i + 1}", f"Poles and start of generator {i + 1}", _bias_caption(g))
     yield _poles(g)
     o, f = g.observer, g.filter
@@ -340,9 +341,9 @@ def _composition(names: list[str], g: Generator) -> str:
         J = float(g.tables.steady[i])
         rows.append([f"residual {i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)])
     return table(
-        ["", "#steady J", "#disturbance", *[f"#events of {names[s]}" for s in shown], "#rounding"],
+        ["", "#steady J", "#disturbance", *[f"#{names[s]}" for s in shown], "#rounding"],
         rows,
-        "What the threshold is made of, once started and at the usual radii.",
+        "What the threshold is made of, once started and at the usual radii of the signals.",
     )
 
 
@@ -396,7 +397,7 @@ def _response_figure(g: Generator, names: list[str]) -> Figure:
     return figure
 
 
-def _response_caption(g: Generator, names: list[str]) -> str:
+def _response_caption(g: Generator) -> str:
     taps = g.tables.weight.shape[0]
     active = int(np.sum(g.tables.weight.max((0, 1)) > 0))
     left = active - min(active, SIGNALS_MAX)
