@@ -102,7 +102,7 @@ def test_in_many_runs_the_truncated_threshold_is_not_passed_though_it_is_no_boun
 
 def test_the_report_promises_nothing_that_the_truncated_threshold_cannot_keep(folder: Path) -> None:
     text = (folder / "report.html").read_text(encoding="utf-8")
-    assert "Not guaranteed in this run: that there is no false alarm" in text
+    assert "Not guaranteed here: that there is no false alarm" in text
     assert "Guaranteed:" not in text
     assert "largest value a healthy plant can show" not in text
 

@@ -93,6 +93,7 @@ def isolability_section(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
     caption = (
         f"A row a fault that is there, a column a hypothesis: the smallest constant fault, in its signal's unit, that no course of the hypothesis explains within {WITHIN} samples, "
         "at the usual radii. It is the limit of any sound detector that looks at so long a window."
+        + (" The plant is taken to be in the middle of its intervals." if design.tables.mismatch is not None else "")
     )
     yield table(["fault present", *[f"#not {names[j]}" for j in faults]], rows, caption)
     reasons = [p for p in pairs if p.reason]
@@ -126,8 +127,9 @@ def _zonotopes(design: Design) -> Iterator[str]:
         warning = "The threshold is the publication's: what does not fit is dropped, not covered. It is no outer bound, so false alarms are possible; it is there for comparison."
         yield f"<aside><p>{esc(warning)}</p></aside>"
     rows = [[design.judges[i], z.order, z.columns, "dropped" if z.reduction == TRUNCATE else "covered", z.recover, z.ready_rest, z.ready_moving] for i, z in used]
-    header = ["", "#order", "#columns", "what does not fit is", "#samples that a loss is followed back", "#ready from rest", "#in motion"]
-    yield table(header, rows, "The set of what the observer's state can be, moved on in every sample, instead of impulse responses over past radii.")
+    header = ["", "#order", "#columns", "what does not fit is", "#samples until an overflow is forgotten", "#ready from rest", "#in motion"]
+    caption = "The set of what the observer's state can be, moved on in every sample. Weights, composition and start of the generators above are those of the exact hull."
+    yield table(header, rows, caption)
 
 
 def _prediction(design: Design) -> Iterator[str]:
@@ -162,7 +164,7 @@ def _moved(design: Design) -> tuple[int, ...]:
 
 def uncertain_names(design: Design) -> list[str]:
     """What the radii are called that stand for uncertain parameters."""
-    return [f"uncertainty of {design.model.plant.states[i]}" for i in _moved(design)]
+    return [f"uncertain {design.model.plant.states[i]}" for i in _moved(design)]
 
 
 def _mismatch(design: Design) -> Iterator[str]:

@@ -25,6 +25,7 @@ from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC
 LINES = (BLUE, RED, GREEN, PINK, AMBER, SKY, MUTED, INK)
 STYLES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
 SIGNALS_MAX = 8  # signals with a line of their own in the picture of the impulse response
+LONG_NAME = 16  # letters of a signal from which a line of a legend has fewer entries
 OPEN_MAX = 4  # generators that are not folded away
 LARGE = 12  # columns from which a matrix is folded away
 SMALLEST = "Smallest lasting step that reaches the steady threshold, in the signal's unit; ready in samples."
@@ -388,7 +389,7 @@ def _response_figure(g: Generator, names: list[str]) -> Figure:
         handles=handles,
         loc="upper left",
         bbox_to_anchor=(0.85 / total, 1 - 0.03 / height),
-        ncols=min(len(handles), 6),
+        ncols=min(len(handles), 6 if max(map(len, names)) <= LONG_NAME else 4),
         borderaxespad=0,
         columnspacing=1.4,
         handlelength=1.6,

@@ -36,7 +36,7 @@ GUARANTEE = (
     "confirmed fault means that the plant or one of these bounds is broken."
 )
 UNSOUND = (
-    "Not guaranteed in this run: that there is no false alarm. The threshold is the publication's zonotope, which drops generators instead of covering them and so can be "
+    "Not guaranteed here: that there is no false alarm. The threshold is the publication's zonotope, which drops generators instead of covering them and so can be "
     "smaller than what a healthy plant can show. It is there for comparison; detector.threshold exact or zonotope gives the guarantee."
 )
 LIMITS = (
