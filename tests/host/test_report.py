@@ -212,6 +212,7 @@ def make_run(
                 "detected_at": at,
                 "confirmed_at": None if at is None else at + 2,
                 "delay": None if at is None else at - start,
+                "fault": first,
                 "candidates": [] if at is None else [first],
                 "narrowed_at": None if at is None else at + 2,
                 "narrowed_to": [] if at is None else [first],

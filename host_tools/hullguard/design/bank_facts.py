@@ -63,7 +63,7 @@ def _learnt(model: Model, stored: StoredBank) -> BankSpec:
 def usual_thresholds(table: BankTable, usual: Array) -> Array:
     """J of every certificate at usual radii; certificates."""
     J = np.array(table.bias) + table.widen * np.einsum("jsc,s->c", np.abs(np.array(table.weight)), usual[list(table.signal)])
-    return J + np.einsum("jec,e->c", np.array(table.extra_weight), usual[list(table.extra)]) if table.extra else J
+    return np.asarray(J + np.einsum("jec,e->c", np.array(table.extra_weight), usual[list(table.extra)]) if table.extra else J)
 
 
 def _smallest(model: Model, form: WindowForm, table: BankTable, usual: Array, fault: Fault, within: tuple[int, ...]) -> list[float]:

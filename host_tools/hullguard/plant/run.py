@@ -26,6 +26,7 @@ from hullguard.design.design import Design
 from hullguard.design.judges import judges, residual_columns
 from hullguard.errors import BusError, ExpectationError
 from hullguard.model.faults import FaultSpec
+from hullguard.model.schema import Model
 
 ANSWER_TIMEOUT_S = 10.0
 ALARMS = ("provisional", "confirmed")
@@ -334,10 +335,20 @@ def _found(f: FaultSpec, faults: Sequence[FaultSpec], design: Design, trace: Tra
         "detected_at": detected,
         "confirmed_at": sure,
         "delay": None if detected is None else detected - f.start,
+        "fault": _known(design.model, f),
         "candidates": candidate_names(design, seen),
         "narrowed_at": at,
         "narrowed_to": candidate_names(design, least),
     }
+
+
+def _known(model: Model, f: FaultSpec) -> str | None:
+    """The model's fault that an injected one is, by its name or, given by its signal, by what it does there."""
+    signal = model.signal(f.name)
+    applied = any(g.applied_as_sent and signal in g.signals for g in model.groups)
+    named = [x.name for x in model.faults if x.name == f.name]
+    alike = [x.name for x in model.faults if x.signal == signal and (x.type == "actuator") == applied]
+    return (named or alike or [None])[0]
 
 
 def _narrowed(verdicts: Sequence[Verdict]) -> tuple[int, int]:

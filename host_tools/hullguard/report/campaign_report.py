@@ -78,10 +78,10 @@ def _body(result: dict[str, Any]) -> Iterator[str]:
         ]
         yield table(header, rows, "Attacked runs and the others, before any fault")
     yield "<h2>Cases</h2>"
-    header = ["case", "#runs", "#provisional", "#confirmed", "#bound", "#frames", "#bits a run", "#|r|/J", "#found", "#delay", "#10 %", "#90 %", "#limit"]
-    told = len(header) if any(c.get("limit") is not None for c in cases) else len(header) - 1
+    columns = ["case", "#runs", "#provisional", "#confirmed", "#bound", "#frames", "#bits a run", "#|r|/J", "#found", "#delay", "#10 %", "#90 %", "#limit"]
+    told = len(columns) if any(c.get("limit") is not None for c in cases) else len(columns) - 1
     yield table(
-        header[:told],
+        columns[:told],
         [_row(c)[:told] for c in cases],
         "False alarms in runs; bound: upper confidence bound of the share of runs with a confirmed one; delays in samples",
     )
@@ -104,7 +104,7 @@ def _figures(cases: Sequence[Case]) -> Iterator[tuple[str, Figure, str]]:
             )
             yield "delay_by_size", _delay_by_size(found), caption
         if any(len({c["bits_mean"] for c in line}) > 1 for _, line, _ in _lines(found, _alike(found))):
-            caption = "Mean delay of the first alarm against what a case sends; the bar holds the middle 80 % of its runs, a line joins the cases of the same fault, losses and detector."
+            caption = "Mean delay of the first alarm against what a case sends; the bar holds the middle 80 %, a line joins cases of the same fault, losses and detector."
             yield "delay_by_bits", _delay_by_bits(found), caption
         caption = "Share of runs with a confirmed false alarm: what was seen, and how large it can be at most with the stated confidence, exact (Clopper and Pearson)."
         yield "false_alarms", _false_alarms(cases[:BARS_MAX]), caption

@@ -41,9 +41,7 @@ def banks_section(design: Design) -> Iterator[str]:
 
 
 def _sizes(facts: Sequence[BankFacts]) -> str:
-    rows = [
-        [f.name, f.table.certificates, f.table.window, len(f.table.signal), len(f.table.extra), f.cost.coefficients, f.cost.flash_bytes, f.cost.multiplications] for f in facts
-    ]
+    rows = [[f.name, f.table.certificates, f.table.window, len(f.table.signal), len(f.table.extra), f.cost.coefficients, f.cost.flash_bytes, f.cost.multiplications] for f in facts]
     header = ["bank", "#certificates", "#window (samples)", "#signals", "#derived radii", "#coefficients", "#flash (bytes)", "#multiplications a sample"]
     return table(header, rows, "Flash in single precision.")
 
@@ -91,8 +89,8 @@ def isolability_section(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
     yield "<h2>Which faults can be told apart</h2>"
     rows = [[names[i], *[_cell(by.get((i, j))) for j in faults]] for i in faults]
     caption = (
-        f"A row a fault that is there, a column a hypothesis: the smallest constant fault, in its signal's unit, that no course of the hypothesis explains within {WITHIN} samples, "
-        "at the usual radii. It is the limit of any sound detector that looks at so long a window."
+        "A row a fault that is there, a column a hypothesis: the smallest constant fault, in its signal's unit, that no course of the hypothesis explains "
+        f"within {WITHIN} samples, at the usual radii. It is the limit of any sound detector that looks at so long a window."
         + (" The plant is taken to be in the middle of its intervals." if design.tables.mismatch is not None else "")
     )
     yield table(["fault present", *[f"#not {names[j]}" for j in faults]], rows, caption)

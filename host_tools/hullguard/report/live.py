@@ -101,7 +101,8 @@ class LiveTable:
         if state != self._said:
             self._said = state
             health = ", ".join(f"{g} {h}" for g, h in state[1])
-            self.console.print(f"k={k} plant {plant}{may_be(plant, candidates, self._known)}" + (f"; bus: {health}" if health else ""), markup=False, highlight=False, soft_wrap=True)
+            cause = may_be(plant, candidates, self._known)
+            self.console.print(f"k={k} plant {plant}{cause}" + (f"; bus: {health}" if health else ""), markup=False, highlight=False, soft_wrap=True)
 
     def _draw(self) -> None:
         if self._live is not None and self._view is not None:
@@ -122,7 +123,8 @@ class LiveTable:
             Text(f"{rate:.0f} samples/s", style="dim"),
         )
         state = Table.grid(padding=(0, 1))
-        state.add_row("plant", Text().append(f" {PLANT_SAYS.get(plant, plant)} ", style=PLANT_STYLE.get(plant, "")).append(may_be(plant, candidates, self._known).removeprefix(",")))
+        cause = may_be(plant, candidates, self._known).removeprefix(",")
+        state.add_row("plant", Text().append(f" {PLANT_SAYS.get(plant, plant)} ", style=PLANT_STYLE.get(plant, "")).append(cause))
         health = Text()
         for g in self._groups:
             h = bus.get(g, "absent")

@@ -32,6 +32,7 @@ class FaultRun:
     detected: int | None
     confirmed: int | None
     delay: float | None
+    fault: str | None  # the model's fault that it is
     candidates: tuple[str, ...]  # when it was detected
     narrowed_at: int | None  # since when a confirmed alarm left as few candidates as it ever did
     narrowed_to: tuple[str, ...]
@@ -250,6 +251,7 @@ def _faults(top: _Json, labels: list[dict[str, str]]) -> tuple[FaultRun, ...]:
                 detected=f.count("detected_at"),
                 confirmed=f.count("confirmed_at"),
                 delay=f.maybe("delay"),
+                fault=None if f.raw("fault") is None else f.text("fault"),
                 candidates=tuple(str(c) for c in f.list("candidates")),
                 narrowed_at=f.count("narrowed_at"),
                 narrowed_to=tuple(str(c) for c in f.list("narrowed_to")),

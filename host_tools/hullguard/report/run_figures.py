@@ -599,8 +599,8 @@ def candidate_figure(run: Run, w: Window) -> Figure:
     for i, values in enumerate(state.values()):
         _bars(ax, run, w, len(state) - 1 - i, values, PLANT, ALARM_FILL, {})
     for f in run.faults:
-        if f.name in state:
-            row = len(state) - 1 - list(state).index(f.name)
+        if f.fault in state:
+            row = len(state) - 1 - list(state).index(f.fault)
             start, end = run.at(f.start), run.end if f.end is None else run.at(f.end)
             ax.broken_barh([(start, end - start)], (row - 0.46, 0.92), facecolors="none", edgecolors=PINK, lw=1.6, zorder=5)
     ax.set_ylim(-0.6, len(state) - 0.4)
@@ -611,7 +611,7 @@ def candidate_figure(run: Run, w: Window) -> Figure:
     mark_faults_above(ax, run)
     seen = {PLANT[i] for values in state.values() for i in np.unique(values)}
     handles: list[Artist] = [Patch(facecolor=fill, label=f"candidate, {name}") for name, (fill, _) in ALARM_FILL.items() if name in seen]
-    if any(f.name in state for f in run.faults):
+    if any(f.fault in state for f in run.faults):
         handles.append(Patch(facecolor="none", edgecolor=PINK, lw=1.6, label="fault present"))
     sheet.legend(handles, left)
     return sheet.figure

@@ -336,12 +336,11 @@ def _communication(run: Run) -> str:
 
 
 def _verdict_table(run: Run) -> Iterator[str]:
-    rows = [
-        [v.k, num(v.k * run.sample_time_s, 6), v.plant, ", ".join(v.candidates) or "–", ", ".join(f"{g} {h}" for g, h in v.bus.items())] for v in run.verdicts[:VERDICTS_MAX]
-    ]
+    rows = [[v.k, num(v.k * run.sample_time_s, 6), v.plant, ", ".join(v.candidates) or "–", ", ".join(f"{g} {h}" for g, h in v.bus.items())] for v in run.verdicts[:VERDICTS_MAX]]
     more = "" if len(run.verdicts) <= VERDICTS_MAX else f"The first {VERDICTS_MAX} of {len(run.verdicts)}; all are in run.json."
     if rows:
-        yield (f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>" + table(["#sample", "#time (s)", "plant", "may be", "bus"], rows, more) + "</details>")
+        drawn = table(["#sample", "#time (s)", "plant", "may be", "bus"], rows, more)
+        yield f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>{drawn}</details>"
 
 
 def _facts(run: Run) -> str:
