@@ -348,7 +348,7 @@ def _known(model: Model, f: FaultSpec) -> str | None:
     applied = any(g.applied_as_sent and signal in g.signals for g in model.groups)
     named = [x.name for x in model.faults if x.name == f.name]
     alike = [x.name for x in model.faults if x.signal == signal and (x.type == "actuator") == applied]
-    return (named or alike or [None])[0]
+    return next(iter([*named, *alike]), None)
 
 
 def _narrowed(verdicts: Sequence[Verdict]) -> tuple[int, int]:
