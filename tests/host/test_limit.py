@@ -157,9 +157,9 @@ def test_the_command_tells_every_delay_and_does_not_depend_on_workers(cli: Cli) 
     found = one.json
     assert [(r["fault"], r["size"], r["runs"]) for r in found["rows"]] == [("controller2", 1.0, 12), ("controller2", 2.0, 12)]
     for row in found["rows"]:
-        assert set(row["detectors"]) == {"detector", "generator 1"}
-        assert row["found"] == dict.fromkeys(("limit", "detector", "generator 1"), 12)
-        assert 1.0 <= row["limit"] <= row["detectors"]["detector"] == row["detectors"]["generator 1"]
+        assert set(row["detectors"]) == {"detector", "observer 1"}
+        assert row["found"] == dict.fromkeys(("limit", "detector", "observer 1"), 12)
+        assert 1.0 <= row["limit"] <= row["detectors"]["detector"] == row["detectors"]["observer 1"]
     assert found["rows"][0]["limit"] > found["rows"][1]["limit"]
 
 

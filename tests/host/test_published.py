@@ -122,6 +122,12 @@ def test_other_scenarios_keep_their_report(cli: Cli, tmp_path: Path) -> None:
     assert read_run(tmp_path).before == ()
 
 
+def test_the_figures_are_there_with_prediction_too(cli: Cli, tmp_path: Path) -> None:
+    options = ("--set", "detector.prediction=true", "--bus", "inprocess", "--out", tmp_path, "-q")
+    assert cli("run", "platoon", "--scenario", "published", *options).status == 0
+    assert len(read_run(tmp_path).before) == 2
+
+
 def test_a_run_that_lost_its_residuals_before_the_filter_is_refused(folder: Path, tmp_path: Path) -> None:
     for name in ("run.json", "labels.csv", "signals.csv"):
         (tmp_path / name).write_text((folder / name).read_text(encoding="utf-8").replace("before1.2", "elsewhere"), encoding="utf-8")

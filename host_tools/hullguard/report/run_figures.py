@@ -588,13 +588,8 @@ def candidates(run: Run) -> dict[str, Array]:
     return state
 
 
-def candidate_figure(run: Run, w: Window) -> Figure:
-    """Which fault it may be, in time: a row a fault of the model; a box marks where the fault was injected."""
-    state = candidates(run)
-    height = 0.12 + 0.25 * len(state)
-    sheet = Sheet([height], 0.0, _top(run, heading=False))
-    left = _name_margin(list(state))
-    ax = sheet.add(height, left=left)
+def draw_candidates(ax: Axes, run: Run, w: Window, state: dict[str, Array]) -> None:
+    """A row a fault of the model; a box marks where the fault was injected."""
     _limits(ax, run, w)
     for i, values in enumerate(state.values()):
         _bars(ax, run, w, len(state) - 1 - i, values, PLANT, ALARM_FILL, {})
@@ -607,6 +602,16 @@ def candidate_figure(run: Run, w: Window) -> Figure:
     ax.set_yticks(range(len(state) - 1, -1, -1), list(state))
     ax.tick_params(axis="y", length=0)
     ax.grid(False, axis="y")
+
+
+def candidate_figure(run: Run, w: Window) -> Figure:
+    """Which fault it may be, in time."""
+    state = candidates(run)
+    height = 0.12 + 0.25 * len(state)
+    sheet = Sheet([height], 0.0, _top(run, heading=False))
+    left = _name_margin(list(state))
+    ax = sheet.add(height, left=left)
+    draw_candidates(ax, run, w, state)
     ax.set_xlabel("time (s)")
     mark_faults_above(ax, run)
     seen = {PLANT[i] for values in state.values() for i in np.unique(values)}
@@ -681,12 +686,14 @@ def signal_figure(run: Run, w: Window) -> Figure:
 
 
 def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
-    """Residuals, events and verdict below one another."""
+    """Residuals, events, verdict and, where banks isolate, candidate faults below one another."""
     residuals = near(run, w, chosen_residuals(run)[0], count)
     raster = 0.12 + 0.26 * len(run.groups)
     bars = 0.12 + 0.25 * (1 + len(run.groups))
-    sheet = Sheet([1.35] * len(residuals) + [raster, bars], 0.34, _top(run, 0.3), 0.5, 10.0)
-    left = _name_margin([f"bus: {g.name}" for g in run.groups])
+    state = candidates(run) if run.isolating else {}
+    causes = [0.12 + 0.22 * len(state)] if state else []
+    sheet = Sheet([1.35] * len(residuals) + [raster, bars, *causes], 0.34, _top(run, 0.3), 0.5, 10.0)
+    left = _name_margin([f"bus: {g.name}" for g in run.groups] + list(state))
     axes = []
     for i, r in enumerate(residuals):
         ax = sheet.add(1.35, left=left)
@@ -714,6 +721,11 @@ def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
         handletextpad=0.4,
     )
     axes.append(ax)
+    for height in causes:
+        ax = sheet.add(height, left=left)
+        draw_candidates(ax, run, w, state)
+        heading(ax, "which fault it may be")
+        axes.append(ax)
     _times(axes)
     sheet.legend(residual_legend(run), left=left)
     return sheet.figure
