@@ -78,7 +78,7 @@ def _body(result: dict[str, Any]) -> Iterator[str]:
         ]
         yield table(header, rows, "Attacked runs and the others, before any fault")
     yield "<h2>Cases</h2>"
-    columns = ["case", "#runs", "#provisional", "#confirmed", "#bound", "#frames", "#bits a run", "#|r|/J", "#found", "#delay", "#10 %", "#90 %", "#limit"]
+    columns = ["case", "#runs", "#provisional", "#confirmed", "#bound", "#frames", "#bits a\u00a0run", "#|r|/J", "#found", "#delay", "#10\u00a0%", "#90\u00a0%", "#limit"]
     told = len(columns) if any(c.get("limit") is not None for c in cases) else len(columns) - 1
     yield table(
         columns[:told],

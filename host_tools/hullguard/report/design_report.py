@@ -340,7 +340,7 @@ def _composition(names: list[str], g: Generator) -> str:
     rows = []
     for i in range(len(g.tables.steady)):
         J = float(g.tables.steady[i])
-        rows.append([f"residual {i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)])
+        rows.append([f"residual\u00a0{i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)])
     return table(
         ["", "#steady J", "#disturbance", *[f"#{names[s]}" for s in shown], "#rounding"],
         rows,

@@ -263,7 +263,7 @@ def _tiles(run: Run) -> Iterator[str]:
         delays = [d for d in (delay_of(f) for f in found) if d is not None]
         if delays:
             mean = sum(delays) / len(delays)
-            longest = "" if len(delays) == 1 else f", longest {num(max(delays))} samples"
+            longest = "" if len(delays) == 1 else f", longest {plural(round(max(delays)), 'sample')}"
             yield tile("delay (samples)" if len(delays) == 1 else "mean delay (samples)", num(mean), f"{num(mean * run.sample_time_s)} s{longest}")
     alarms = info["false_alarms"]
     confirmed, provisional = round(alarms["confirmed"]), round(alarms["provisional"])
