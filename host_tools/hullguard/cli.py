@@ -104,6 +104,8 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--out", metavar="DIR", help="folder for tables, DBC and report (default build/NAME)")
     p.add_argument("--fresh", action="store_true", help="search again even if NAME.design.toml fits the model")
 
+    p.add_argument("--isolability", action="store_true", help="which faults can be told apart, also for a model without banks for isolation; a minute for many faults")
+
     p = add("run", "run a model: emulated plant, triggers, bus, detector node")
     _common(p)
     _scenario(p)

@@ -31,15 +31,17 @@ from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native, Plant, Recording, Verdict
 from hullguard.design import store
 from hullguard.design.design import Design, design, finish, stored_for
+from hullguard.design.isolation import Pair, isolability
 from hullguard.errors import BusError, ExpectationError, InputError
 from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_override
 from hullguard.model.schema import FAULTS_MAX
 from hullguard.plant.detect import Detector, from_bus, from_log
 from hullguard.plant.recording import read_recording
-from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, summary, write_files
+from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, candidate_names, spoken, summary, write_files
 
 INSIDE = "HULLGUARD_INSIDE"  # set for the copy of a command that runs where with-vcan made a bus
 NODE_START_S = 20.0
+ISOLABILITY_WINDOW = 30  # samples, for a model that has no bank
 
 
 def say(args: argparse.Namespace, text: str) -> None:
@@ -135,9 +137,20 @@ def _by_fault(made: Design, faults: Sequence[int], values: Any) -> dict[str, flo
     return {made.model.faults[f].name: (float(v) if np.isfinite(v) else None) for f, v in zip(faults, values, strict=True)}
 
 
+def _isolability(args: argparse.Namespace, made: Design) -> list[Pair]:
+    """Which faults can be told apart: where the model isolates, or on demand, for it takes a linear programme a pair and sample."""
+    wish = made.model.detector.isolation or (made.model.detector.bank if args.isolability else None)
+    if wish is None and not args.isolability:
+        return []
+    with progress(args, "isolability") as tick:
+        return isolability(made.model, wish.window if wish else ISOLABILITY_WINDOW, tuple(range(len(made.model.faults))), tick=tick)
+
+
 def run_design(args: argparse.Namespace) -> int:
     """`hullguard design`."""
     from hullguard.codegen import write_all
+    from hullguard.design.bank_facts import bank_facts
+    from hullguard.report.design_banks import as_json
     from hullguard.report.design_report import write_design_report
 
     overrides = dict(parse_override(text) for text in args.set)
@@ -157,19 +170,23 @@ def run_design(args: argparse.Namespace) -> int:
         store.write(out / f"{model.path.stem}.design.toml", model.path.stem, stored)
     write_all(made, out)
     report = out / f"{model.name}.html"
-    write_design_report(made, report)
+    pairs = _isolability(args, made)
+    write_design_report(made, report, pairs)
     for c in made.checks:
         say(args, f"  {c.name}: {c.value:.4g} (limit {c.limit:.4g})")
     for i, g in enumerate(made.generators):
         found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
         say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
+    for f in bank_facts(made):
+        found = ", ".join(f"{made.model.faults[i].name} {v:.3g}" for i, v in zip(f.faults, f.smallest[:, 0], strict=True))
+        say(args, f"  {f.name}: {f.table.certificates} certificates over {f.table.window} samples, smallest fault within {f.within[0]} samples: {found}")
     say(args, f"model {model.name}, hash {made.tables.hash:08x}: tables, DBC and report in {out}" + ("" if own else f"; search kept in {beside.name}" if not overrides else ""))
     emit(args, {
         "model": model.name, "model_hash": f"{made.tables.hash:08x}", "out": str(out), "generators": matrices(made),
         "slews": {s.name: stored.slew[i].tolist() for i, s in enumerate(model.signals)},
         "state_range": stored.state_range.tolist(),
         "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "passed": c.passed} for c in made.checks],
-        "load_bound": made.load_bound, "reused": own,
+        "load_bound": made.load_bound, "reused": own, **as_json(made, pairs),
     })  # fmt: skip
     return 0
 
@@ -279,7 +296,8 @@ def _loop(args: argparse.Namespace, made: Design, source: Source, samples: int, 
         def watch(k: int, trace: Trace) -> None:
             ratios = [abs(r) / J for r, J in zip(trace.r[-1], trace.J[-1], strict=True)]
             v = trace.verdict[-1]
-            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, dict(zip((g.name for g in made.tables.groups), v.bus, strict=True)), trace.counts["measurement"])
+            bus = dict(zip((g.name for g in made.tables.groups), v.bus, strict=True))
+            table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, bus, trace.counts["measurement"], candidate_names(made, v.candidates))
 
         return run.samples(source, samples, watch), run.mismatch
 
@@ -379,9 +397,16 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
             say(args, f"{began}, not found")
         else:
             sure = "confirmed at once" if f["confirmed_at"] == f["detected_at"] else f"confirmed at {f['confirmed_at']}" if f["confirmed_at"] is not None else "not confirmed"
-            say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}")
+            say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}" + _narrowed(f))
     alarms = result["false_alarms"]
     say(args, f"false alarms before the fault: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J {result['margin_max']:.3f}")
+
+
+def _narrowed(f: dict[str, Any]) -> str:
+    """What is left of a fault's candidates, where later alarms have excluded some."""
+    if f["narrowed_at"] is None or f["narrowed_to"] == f["candidates"]:
+        return ""
+    return f"; from sample {f['narrowed_at']} on {', '.join(f['narrowed_to']) or 'no single one of them'}"
 
 
 def _expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
@@ -440,16 +465,17 @@ def signalled() -> Iterator[Callable[[], bool]]:
 
 def run_detect(args: argparse.Namespace) -> int:
     """`hullguard detect`."""
+    from hullguard.report.live import may_be
+
     _, made = prepared(args)
     native = Native(library(args.real), made.tables)
     changes: list[dict[str, Any]] = []
 
     def watch(v: Verdict) -> None:
-        bus = dict(zip((g.name for g in native.tables.groups), v.bus, strict=True))
-        if not changes or changes[-1]["plant"] != v.plant or changes[-1]["bus"] != bus:
-            changes.append({"k": v.k, "plant": v.plant, "bus": bus})
-            names = [x.name for i, x in enumerate(made.model.faults) if v.candidates >> i & 1]
-            say(args, f"k {v.k}: plant {v.plant}" + (f", may be {', '.join(names)}" if names else "") + f"; bus {', '.join(f'{n} {s}' for n, s in bus.items())}")
+        row = spoken(made, v)
+        if not changes or {**changes[-1], "k": v.k} != row:
+            changes.append(row)
+            say(args, f"k {v.k}: plant {v.plant}{may_be(v.plant, row['candidates'], bool(made.model.faults))}; bus {', '.join(f'{n} {s}' for n, s in row['bus'].items())}")
 
     start = REST if args.rest else MOVING
     if args.log:

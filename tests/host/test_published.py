@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host_support import REALS, Cli, Models
+from host_support import REALS, Alarms, Cli, Models, alarms
 from hullguard.core.library import library
 from hullguard.core.pair import Pair
+from hullguard.design.zonotope_table import TRUNCATE
 from hullguard.errors import InputError
 from hullguard.model import load_model
 from hullguard.report.run_data import Run, read_run
@@ -35,6 +36,8 @@ def run(folder: Path) -> Run:
 def test_the_settings_are_the_publications(models: Models) -> None:
     made = models.design(scenario="published")
     g, trigger = made.generators[0], made.model.groups[0].trigger
+    assert g.zonotope is not None
+    assert (g.zonotope.reduction, g.zonotope.columns) == (TRUNCATE, 12)
     assert (g.spec.order, g.observer.W.shape[0], g.spec.aware, g.spec.chosen) == (4, 2, False, True)
     assert g.spec.order < made.model.plant.n
     assert set(trigger.silence) == {1}
@@ -77,6 +80,33 @@ def test_the_fault_shows_in_r2_and_hardly_in_r1(run: Run) -> None:
     assert run.info["false_alarms"] == {"provisional": 0, "confirmed": 0}
 
 
+def test_in_many_runs_the_truncated_threshold_is_not_passed_though_it_is_no_bound(models: Models) -> None:
+    """In 2000 runs |r|/J was at most 0.991 at the start and 0.71 after it, R1 never left its threshold, and every fault was found after 2 .. 10 samples."""
+    ready = models.platoon("published")
+    batch = ready.batch(SAMPLES, ("controller2:bias:3.0@50",))
+    rows = batch.runs(0, 200)
+    assert alarms(rows) == Alarms(0, 0)
+    assert max(r["margin"] for r in rows) < 1.0
+    assert max(r["margin_settled"] for r in rows) < 0.9
+    assert all(START <= r["confirmed_at"] <= START + 15 for r in rows)
+    exact = models.platoon("published", {"detector.threshold": "exact"}).batch(SAMPLES, ("controller2:bias:3.0@50",))
+    shares = []
+    for i in range(5):
+        found, bound = batch.trace(i), exact.trace(i)
+        assert np.all(np.abs(found["r"][:, 0]) <= found["J"][:, 0])
+        shares.append(found["J"] / bound["J"])
+    # What a healthy plant can show is the exact hull; the truncated set stays below it, by a third at times.
+    assert np.max(shares) < 1.0 + 1e-5
+    assert np.min(shares) < 0.8
+
+
+def test_the_report_promises_nothing_that_the_truncated_threshold_cannot_keep(folder: Path) -> None:
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Not guaranteed here: that there is no false alarm" in text
+    assert "Guaranteed:" not in text
+    assert "largest value a healthy plant can show" not in text
+
+
 def test_the_report_begins_with_the_publications_four_figures(folder: Path) -> None:
     text = (folder / "report.html").read_text(encoding="utf-8")
     places = [text.index(f'aria-label="{f}"') for f in FIGURES]
@@ -90,6 +120,12 @@ def test_other_scenarios_keep_their_report(cli: Cli, tmp_path: Path) -> None:
     assert cli("run", "platoon", "--bus", "inprocess", "--samples", 60, "--no-fault", "--out", tmp_path, "-q").status == 0
     assert "publication" not in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert read_run(tmp_path).before == ()
+
+
+def test_the_figures_are_there_with_prediction_too(cli: Cli, tmp_path: Path) -> None:
+    options = ("--set", "detector.prediction=true", "--bus", "inprocess", "--out", tmp_path, "-q")
+    assert cli("run", "platoon", "--scenario", "published", *options).status == 0
+    assert len(read_run(tmp_path).before) == 2
 
 
 def test_a_run_that_lost_its_residuals_before_the_filter_is_refused(folder: Path, tmp_path: Path) -> None:

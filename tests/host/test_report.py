@@ -163,8 +163,9 @@ def make_run(
     verdicts: list[dict[str, Any]] = []
     for k in range(samples):
         health = {name: "absent" if k < 1 else "stale" if stale and stale[0] + 9 <= k < stale[1] and i == 0 else "good" for i, name in enumerate(events)}
-        entry = {"k": k, "plant": words[plant[k]], "bus": health}
-        if not verdicts or (entry["plant"], health) != (verdicts[-1]["plant"], verdicts[-1]["bus"]):
+        suspects = [groups[0][1][0]] if plant[k] > 1 else []
+        entry = {"k": k, "plant": words[plant[k]], "candidates": suspects, "bus": health}
+        if not verdicts or {**entry, "k": verdicts[-1]["k"]} != verdicts[-1]:
             verdicts.append(entry)
     per_group = {}
     for name, e in events.items():
@@ -181,6 +182,9 @@ def make_run(
         "model": "platoon",
         "model_hash": "1f3a99c0",
         "real": "f32",
+        "threshold": "exact",
+        "known_faults": [first],
+        "judges": [{"name": f"observer {g + 1}", "kind": "observer", "residuals": residuals} for g in range(generators)],
         "bus": "in process",
         "bitrate": 500000,
         "samples": samples,
@@ -208,7 +212,10 @@ def make_run(
                 "detected_at": at,
                 "confirmed_at": None if at is None else at + 2,
                 "delay": None if at is None else at - start,
+                "fault": first,
                 "candidates": [] if at is None else [first],
+                "narrowed_at": None if at is None else at + 2,
+                "narrowed_to": [] if at is None else [first],
             }
             for start, end, at in found
         ],
@@ -254,9 +261,9 @@ def test_small_run(tmp_path: Path) -> None:
         assert f"{100 * info['frames'][key]:.3g} %" in text
     for count in info["per_group"]["measurement"]["histogram"].values():
         assert str(count) in text
-    for label in ("r1.1", "r1.2", "time (s)", "bus load (%)", "gap12 (m)", "speed1 (m/s)", "control1 (m/s²)", "late frames", "Guaranteed:"):
+    for label in ("observer 1, r1", "observer 1, r2", "time (s)", "bus load (%)", "gap12 (m)", "speed1 (m/s)", "control1 (m/s²)", "late frames", "Guaranteed:"):
         assert label in text
-    assert seen.counts["svg"] == 5
+    assert seen.counts["svg"] == 6
 
 
 def test_same_input_same_bytes(tmp_path: Path) -> None:
@@ -276,7 +283,7 @@ def test_large_run(tmp_path: Path) -> None:
     assert "10 residuals not drawn here (5 generators as a whole)" in text
     assert "Around fault F1" in text
     assert "18 residuals of 9 generators" in text
-    assert seen.counts["svg"] == 8
+    assert seen.counts["svg"] == 10
 
 
 def test_no_faults(tmp_path: Path) -> None:
@@ -383,6 +390,9 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "load is text": (edit_json(lambda r: r["frames"].update(load_mean="much")), r"'load_mean' is 'much', expected a finite number"),
     "unknown verdict": (edit_json(lambda r: r["verdicts"][0].update(plant="well")), r"plant 'well' is not one of"),
     "unknown bus health": (edit_json(lambda r: r["verdicts"][0]["bus"].update(control="ill")), r"bus 'ill' is not one of"),
+    "no judges": (edit_json(lambda r: r.pop("judges")), r"key 'judges' is missing"),
+    "a judge too many": (edit_json(lambda r: r["judges"].append({"name": "bank of 4", "kind": "bank", "residuals": 1})), r"column 'r2\.1' is missing"),
+    "unknown kind of judge": (edit_json(lambda r: r["judges"][0].update(kind="oracle")), r"kind 'oracle' is not one of"),
     "no time": (edit_json(lambda r: r.update(sample_time_s=0)), r"must be above 0"),
     "histogram": (edit_json(lambda r: r["per_group"]["control"].update(histogram={"a": 1})), r"'histogram' is not a count"),
     "label column": (lambda d: _put(d / "labels.csv", "start,name\n1,x\n"), r"labels\.csv: column 'end' is missing"),
@@ -477,7 +487,7 @@ def test_live_on_a_terminal_is_throttled_and_leaves_the_last_state(platoon: Desi
         drawn = table.drawn
     assert drawn <= 2 + 5 * (time.monotonic() - began)
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", out.getvalue())
-    for expected in ("gap12_m", "speed1_mps", "r1.2", "fault confirmed", "2000 of 2000 samples"):
+    for expected in ("gap12_m", "speed1_mps", "observer 1, r2", "fault confirmed", "2000 of 2000 samples"):
         assert expected in text
     assert out.getvalue().count("\x1b[?25h") == out.getvalue().count("\x1b[?25l") > 0  # the cursor is back
 

@@ -19,7 +19,8 @@ ROWS_MAX = 2000  # runs that are listed one by one; of more, the table has them
 def campaign_result(parts: Sequence[tuple[Case, Rows]], scenario: str | None, limits: Sequence[float | None] = ()) -> dict[str, Any]:
     """What --json prints: all cases together, each case, and the rows of few runs."""
     first = parts[0][0]
-    head = {"model": first.setup.model.name, "real": first.setup.real, "scenario": first.setup.model.scenario(scenario).name, "confidence": CONFIDENCE}
+    head: dict[str, Any] = {"model": first.setup.model.name, "real": first.setup.real, "scenario": first.setup.model.scenario(scenario).name, "confidence": CONFIDENCE}
+    head["thresholds"] = sorted({case.setup.model.detector.threshold for case, _ in parts})
     shared = {k: v for k, v in first.labels().items() if all(case.labels()[k] == v for case, _ in parts)}
     told = names([case for case, _ in parts])
     cases = [{"case": i, "name": told[i], **case.labels(), **summary([(case, rows)])} for i, (case, rows) in enumerate(parts)]

@@ -265,13 +265,13 @@ class Node:
 
     @property
     def value(self) -> list[float]:
-        """Held values of the last step."""
-        return self._numbers(self.node.detector.value, self.native.tables.signals)
+        """Held values of the last step, then derived ones: width."""
+        return self._numbers(self.node.detector.value, self.native.tables.width)
 
     @property
     def radius(self) -> list[float]:
-        """Radii of the last step."""
-        return self._numbers(self.node.detector.radius, self.native.tables.signals)
+        """Radii of the last step: width."""
+        return self._numbers(self.node.detector.radius, self.native.tables.width)
 
     @property
     def r(self) -> list[float]:

@@ -24,6 +24,7 @@ from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, P
 from hullguard.design.window import Varying
 from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
+from hullguard.model.detector import PUBLISHED
 from hullguard.model.plant import Feedback
 from hullguard.model.schema import GENERATORS_MAX, Model, Observer
 from hullguard.model.table import Array
@@ -61,6 +62,7 @@ class Design:
     tables: Tables
     checks: tuple[Check, ...]
     load_bound: float
+    usual: Array  # radii of the whole vector most of the time
 
     @property
     def judges(self) -> list[str]:
@@ -259,7 +261,7 @@ def finish(model: Model, stored: Stored) -> Design:
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
-    return Design(model, stored, generators, tables, tuple(checks), bound)
+    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual)
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:
@@ -356,7 +358,7 @@ def _zonotope(
     spec = model.detector
     if spec.threshold == "exact":
         return None
-    published = spec.threshold == "zonotope_published"
+    published = spec.threshold == PUBLISHED
     more = np.eye(model.plant.n)[:, list(derived.states)]
     return zonotope.build(linear, T, sub, ranges, radius, exact, signal + derived.uncertain, spec.columns, TRUNCATE if published else BALL, where, published, more)
 

@@ -39,10 +39,12 @@ class Pair:
     reason: str  # why not; empty where they can be told apart
 
 
-def isolability(model: Model, window: int, faults: tuple[int, ...], within: int = WITHIN) -> list[Pair]:
+def isolability(model: Model, window: int, faults: tuple[int, ...], within: int = WITHIN, tick: Callable[[str, int, int], None] = lambda *_: None) -> list[Pair]:
     """Every ordered pair of the given faults."""
-    pairs = []
-    for (i, j), apart in separable(model, window, faults).items():
+    pairs: list[Pair] = []
+    every = separable(model, window, faults)
+    for (i, j), apart in every.items():
+        tick("pairs of faults", len(pairs), len(every))
         truth, hypothesis = model.faults[i], model.faults[j]
         smallest = _smallest(model, window, truth, hypothesis, within) if apart else None
         pairs.append(Pair(i, j, apart, smallest, _reason(truth.name, hypothesis.name, apart, smallest, within)))

@@ -32,9 +32,9 @@ def learnt(model: Model, stored: Stored, workers: int, tick: Tick) -> Stored:
     design = finish(plain, replace(stored, banks=()))
     kept = list(stored.banks)
     if spec.bank is not None and not whole:
-        kept = [b for b in kept if b.hypothesis is not None] + [make_bank(design, _training(model, spec.bank), workers, tick)]
+        kept = [b for b in kept if b.hypothesis is not None] + [make_bank(design, training(model, spec.bank), workers, tick)]
     if spec.isolation is not None and not told:
-        kept = [b for b in kept if b.hypothesis is None] + isolation_banks(design, _training(model, spec.isolation), workers, tick)
+        kept = [b for b in kept if b.hypothesis is None] + isolation_banks(design, training(model, spec.isolation), workers, tick)
     return replace(stored, banks=tuple(sorted(kept, key=_order)))
 
 
@@ -42,7 +42,7 @@ def _order(bank: StoredBank) -> int:
     return -1 if bank.hypothesis is None else bank.hypothesis
 
 
-def _training(model: Model, wish: Wish) -> BankSpec:
+def training(model: Model, wish: Wish) -> BankSpec:
     """At rest, and under manoeuvres where something drives the plant."""
     references = [REST]
     if model.plant.feedback is not None and model.plant.feedback.reference_bound.any():

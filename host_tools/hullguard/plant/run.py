@@ -6,11 +6,12 @@ lockstep its verdicts must be the remote node's.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -22,8 +23,10 @@ from hullguard.core.library import library
 from hullguard.core.native import REST, Frame, Native, Node, Sender, Verdict, frame_bits, read_verdict
 from hullguard.core.pair import Pair
 from hullguard.design.design import Design
+from hullguard.design.judges import judges, residual_columns
 from hullguard.errors import BusError, ExpectationError
 from hullguard.model.faults import FaultSpec
+from hullguard.model.schema import Model
 
 ANSWER_TIMEOUT_S = 10.0
 ALARMS = ("provisional", "confirmed")
@@ -257,6 +260,9 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
         "model": model.name,
         "model_hash": f"{tables.hash:08x}",
         "real": native.library.real,
+        "known_faults": [f.name for f in model.faults],
+        "threshold": model.detector.threshold,
+        "judges": [asdict(j) for j in judges(design)],
         **facts,
         "bitrate": model.bitrate_bps,
         "samples": samples,
@@ -280,7 +286,7 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
         "false_alarms": {"provisional": _episodes(alarms[:first]), "confirmed": _episodes(confirmed[:first])},
         "communication": trace.health,
         "margin_max": margin,
-        "verdicts": _changes(tables.groups, trace.verdict),
+        "verdicts": changes(design, trace.verdict),
     }
 
 
@@ -319,7 +325,8 @@ def _found(f: FaultSpec, faults: Sequence[FaultSpec], design: Design, trace: Tra
     quiet = next((k for k in range(f.start, last) if k == 0 or not alarms[k - 1]), last)
     detected = next((k for k in range(quiet, last) if alarms[k]), None)
     sure = None if detected is None else next((k for k in range(detected, len(alarms)) if confirmed[k]), None)
-    bits = trace.verdict[detected].candidates if detected is not None else 0
+    seen = trace.verdict[detected].candidates if detected is not None else 0
+    at, least = (None, 0) if sure is None else _narrowed(trace.verdict[sure:last])
     return {
         "name": f.name,
         "kind": f.kind,
@@ -328,17 +335,47 @@ def _found(f: FaultSpec, faults: Sequence[FaultSpec], design: Design, trace: Tra
         "detected_at": detected,
         "confirmed_at": sure,
         "delay": None if detected is None else detected - f.start,
-        "candidates": [x.name for i, x in enumerate(design.model.faults) if bits >> i & 1],
+        "fault": _known(design.model, f),
+        "candidates": candidate_names(design, seen),
+        "narrowed_at": at,
+        "narrowed_to": candidate_names(design, least),
     }
 
 
-def _changes(groups: Sequence[Any], verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
-    changes: list[dict[str, Any]] = []
+def _known(model: Model, f: FaultSpec) -> str | None:
+    """The model's fault that an injected one is, by its name or, given by its signal, by what it does there."""
+    signal = model.signal(f.name)
+    applied = any(g.applied_as_sent and signal in g.signals for g in model.groups)
+    named = [x.name for x in model.faults if x.name == f.name]
+    alike = [x.name for x in model.faults if x.signal == signal and (x.type == "actuator") == applied]
+    return next(iter([*named, *alike]), None)
+
+
+def _narrowed(verdicts: Sequence[Verdict]) -> tuple[int, int]:
+    """Sample since which a confirmed alarm, that of the first verdict, has left as few candidates as it ever did, and these."""
+    alarmed = list(itertools.takewhile(lambda v: v.plant == "confirmed", verdicts))
+    best = min(alarmed, key=lambda v: v.candidates.bit_count())
+    return best.k, best.candidates
+
+
+def candidate_names(design: Design, mask: int) -> list[str]:
+    """Faults of a verdict's mask, by name."""
+    return [f.name for i, f in enumerate(design.model.faults) if mask >> i & 1]
+
+
+def changes(design: Design, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """The verdicts that say something else than the one before."""
+    said: list[dict[str, Any]] = []
     for v in verdicts:
-        row = {"plant": v.plant, "bus": {g.name: b for g, b in zip(groups, v.bus, strict=True)}}
-        if not changes or {"plant": changes[-1]["plant"], "bus": changes[-1]["bus"]} != row:
-            changes.append({"k": v.k, **row})
-    return changes
+        row = spoken(design, v)
+        if not said or {**said[-1], "k": v.k} != row:
+            said.append(row)
+    return said
+
+
+def spoken(design: Design, v: Verdict) -> dict[str, Any]:
+    """A verdict by names."""
+    return {"k": v.k, "plant": v.plant, "candidates": candidate_names(design, v.candidates), "bus": {g.name: b for g, b in zip(design.tables.groups, v.bus, strict=True)}}
 
 
 def before_filter(design: Design, trace: Trace) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -354,10 +391,10 @@ def write_files(directory: Path, design: Design, native: Native, trace: Trace, f
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "run.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     names = [s.name for s in model.signals]
-    residuals = [f"{g + 1}.{i + 1}" for g, t in enumerate(tables.generators) for i in range(len(t.output))]
+    residuals = residual_columns(judges(design))
     header = ["time_s", "k"] + [c for n in names for c in (n, f"{n}.value", f"{n}.radius")]
     before = before_filter(design, trace) if result.get("figures") else np.zeros((len(trace.verdict), 0))
-    header += [c for x in residuals for c in (f"r{x}", f"J{x}")] + [f"before{x}" for x in residuals if before.size]
+    header += [c for x in residuals for c in (f"r{x}", f"J{x}")] + [f"before{x}" for x in residuals[: before.shape[1]]]
     header += ["plant"] + [f"event.{g.name}" for g in tables.groups] + ["bits"]
     codes = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
     with (directory / "signals.csv").open("w", encoding="utf-8") as file:

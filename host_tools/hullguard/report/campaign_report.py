@@ -13,7 +13,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hullguard.errors import InputError
+from hullguard.model.detector import PUBLISHED
 from hullguard.report.page import AMBER, BLUE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, num, page, percent, picture, plural, table, tile
+from hullguard.report.run_report import UNSOUND
 
 COLOURS = (BLUE, RED, GREEN, PINK, AMBER, SKY, INK, MUTED)
 LINES_MAX = len(COLOURS)
@@ -63,7 +65,11 @@ def _body(result: dict[str, Any]) -> Iterator[str]:
         tile("largest |r|/J", num(result["margin_settled_max"]), "before a fault, once the start is over"),
     ]
     yield f'<div class="tiles">{"".join(tiles)}</div>'
-    yield f"<p>{GUARANTEE}</p>"
+    thresholds = result["thresholds"]
+    if PUBLISHED in thresholds:
+        yield f"<aside><p>{'In the cases with the threshold ' + PUBLISHED + ': n' + UNSOUND[1:] if len(thresholds) > 1 else UNSOUND}</p></aside>"
+    if thresholds != [PUBLISHED]:
+        yield f"<p>{GUARANTEE}</p>"
     if "attacked" in result:
         header = ("runs", "#number", "#largest |r|/J", "#once the start is over", "#its mean over the runs")
         rows = [
@@ -72,9 +78,11 @@ def _body(result: dict[str, Any]) -> Iterator[str]:
         ]
         yield table(header, rows, "Attacked runs and the others, before any fault")
     yield "<h2>Cases</h2>"
+    columns = ["case", "#runs", "#provisional", "#confirmed", "#bound", "#frames", "#bits a\u00a0run", "#|r|/J", "#found", "#delay", "#10\u00a0%", "#90\u00a0%", "#limit"]
+    told = len(columns) if any(c.get("limit") is not None for c in cases) else len(columns) - 1
     yield table(
-        ("case", "#runs", "#provisional", "#confirmed", "#bound", "#frames", "#bits a run", "#|r|/J", "#found", "#delay", "#10 %", "#90 %", "#limit"),
-        [_row(c) for c in cases],
+        columns[:told],
+        [_row(c)[:told] for c in cases],
         "False alarms in runs; bound: upper confidence bound of the share of runs with a confirmed one; delays in samples",
     )
 
@@ -95,8 +103,8 @@ def _figures(cases: Sequence[Case]) -> Iterator[tuple[str, Figure, str]]:
                 "Mean delay of the first alarm against the size of the fault; the band holds the middle 80 % of the runs, dashes are the limit of any detector where it is known."
             )
             yield "delay_by_size", _delay_by_size(found), caption
-        if len({c["bits_mean"] for c in found}) > 1:
-            caption = "Mean delay of the first alarm against what a case sends; the bar holds the middle 80 % of its runs, a line joins the cases of the same fault and losses."
+        if any(len({c["bits_mean"] for c in line}) > 1 for _, line, _ in _lines(found, _alike(found))):
+            caption = "Mean delay of the first alarm against what a case sends; the bar holds the middle 80 %, a line joins cases of the same fault, losses and detector."
             yield "delay_by_bits", _delay_by_bits(found), caption
         caption = "Share of runs with a confirmed false alarm: what was seen, and how large it can be at most with the stated confidence, exact (Clopper and Pearson)."
         yield "false_alarms", _false_alarms(cases[:BARS_MAX]), caption
@@ -116,10 +124,15 @@ def _lines(cases: Sequence[Case], apart: Sequence[str]) -> list[tuple[str, list[
     return [(name if i < LINES_MAX else "", line, COLOURS[min(i, LINES_MAX - 1)]) for i, (name, line) in enumerate(lines.items())]
 
 
+def _alike(cases: Sequence[Case]) -> tuple[str, ...]:
+    """What the cases of a line have in common: along it only what is sent changes, by trigger or plant."""
+    return ("fault", "loss", "loss_burst", *sorted({k for c in cases for k in c if k.startswith("detector.")}))
+
+
 def _finish(figure: Figure, ax: Axes, xlabel: str) -> Figure:
     ax.set_xlabel(xlabel)
     ax.set_ylabel("delay (samples)")
-    ax.set_ylim(bottom=0)
+    ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])  # a delay of 0 is seen as a whole
     if any(ax.get_legend_handles_labels()[1]):
         figure.legend(loc="outside upper left", ncols=2)
     return figure
@@ -139,9 +152,9 @@ def _delay_by_size(cases: Sequence[Case]) -> Figure:
 
 
 def _delay_by_bits(cases: Sequence[Case]) -> Figure:
-    """Cases with the same faults and losses are one line: along it only trigger or detector change."""
+    """Cases with the same faults, losses and detector are one line."""
     figure, ax = _axes(9.8, 4.0)
-    for name, unordered, colour in _lines(cases, ("fault", "loss", "loss_burst")):
+    for name, unordered, colour in _lines(cases, _alike(cases)):
         line = sorted(unordered, key=lambda c: float(c["bits_mean"]))
         mean = [c["delay_mean"] for c in line]
         # A mean may lie outside the middle 80 %; a bar has no negative length.
@@ -158,7 +171,8 @@ def _false_alarms(cases: Sequence[Case]) -> Figure:
     ax.barh(place, bound, height=0.6, color=SKY, alpha=0.4, label="at most, with the stated confidence")
     ax.barh(place, seen, height=0.6, color=RED, label="seen")
     for i, c in enumerate(cases):
-        ax.text(bound[i], i, f" {c['false_alarm_runs']} of {c['runs']}", va="center", ha="left", fontsize=7.5, color=MUTED)
+        seen_of = f"{c['false_alarm_runs']} of {c['runs']}"
+        ax.annotate(seen_of, (bound[i], i), xytext=(4, 0), textcoords="offset points", va="center", ha="left", fontsize=7.5, color=MUTED)
     ax.set_yticks(list(place), [c["name"] for c in cases])
     ax.set_ylim(len(cases) - 0.5, -0.5)
     ax.grid(visible=False, axis="y")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,30 +14,35 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from hullguard.bus.bits import worst_bits
 from hullguard.design.design import Design, Generator
+from hullguard.design.isolation import Pair
+from hullguard.design.judges import BANK, HYPOTHESIS, judges
+from hullguard.design.tables import GeneratorTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section, uncertain_names
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
 LINES = (BLUE, RED, GREEN, PINK, AMBER, SKY, MUTED, INK)
 STYLES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
 SIGNALS_MAX = 8  # signals with a line of their own in the picture of the impulse response
+LONG_NAME = 16  # letters of a signal from which a line of a legend has fewer entries
 OPEN_MAX = 4  # generators that are not folded away
 LARGE = 12  # columns from which a matrix is folded away
 SMALLEST = "Smallest lasting step that reaches the steady threshold, in the signal's unit; ready in samples."
 SLEWS_MAX = 6  # columns of the table of slews
 
 
-def write_design_report(design: Design, path: Path) -> None:
-    """Write the report of a finished design."""
+def write_design_report(design: Design, path: Path, pairs: Sequence[Pair] = ()) -> None:
+    """Write the report of a finished design. `pairs`: which faults can be told apart, where that was looked into."""
     with mpl.rc_context(RC):
-        text = page(f"Design of {design.model.name}", _body(design))
+        text = page(f"Design of {design.model.name}", _body(design, pairs))
     try:
         path.write_bytes(text.encode())
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _body(design: Design) -> Iterator[str]:
+def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
     yield from _summary(design)
     yield "<h2>Plant and signals</h2>"
     yield _signals(design)
@@ -57,6 +62,10 @@ def _body(design: Design) -> Iterator[str]:
         yield from _generator(design, i, g)
         if folded:
             yield "</details>"
+    yield from banks_section(design)
+    yield from isolability_section(design, pairs)
+    yield from derived_section(design)
+    yield from cost_section(design)
     yield "<h2>Checks</h2>"
     yield _checks(design)
 
@@ -71,8 +80,7 @@ def _summary(design: Design) -> Iterator[str]:
         f'<p class="note">{plural(model.plant.n, "state")}, {plural(model.plant.m, "output")}, {plural(model.plant.p, "input")}; {num(model.sample_time_s * 1000)} ms; '
         f"{num(model.bitrate_bps / 1000)} kbit/s; model hash <code>{design.tables.hash:08x}</code></p>"
     )
-    residuals = design.tables.residuals
-    yield f'<p class="lead">{plural(len(design.generators), "residual generator")} with {plural(residuals, "residual")}; {passed} of {len(design.checks)} checks passed.</p>'
+    yield f'<p class="lead">{esc(_judging(design))}; {passed} of {len(design.checks)} checks passed.</p>'
     used = [g for g in design.generators if g.filter.regularised > 0]
     if used:
         names = ", ".join(str(i + 1) for i, g in enumerate(design.generators) if g.filter.regularised > 0)
@@ -84,15 +92,20 @@ def _summary(design: Design) -> Iterator[str]:
     if best:
         name, size = max(best.items(), key=lambda kv: kv[1])
         tiles.append(tile("hardest fault asked for", num(size), f"{name}: smallest size that is found"))
-    tiles.append(
-        tile(
-            "ready after",
-            f"{max(g.tables.ready_rest for g in design.generators)} samples",
-            f"from rest; {max(g.tables.ready_moving for g in design.generators)} in motion",
-        )
-    )
+    full = max((b.window for b in design.tables.banks), default=0)
+    rest, moving = (max([full, *(ready(g) for g in design.tables.generators)]) for ready in (_ready_rest, _ready_moving))
+    tiles.append(tile("ready after", f"{rest} samples", f"from rest; {moving} in motion"))
     tiles.append(tile("longest history", f"{design.tables.history} samples", "of radii, in RAM"))
     yield '<div class="tiles">' + "".join(tiles) + "</div>"
+
+
+def _judging(design: Design) -> str:
+    """What the detector is made of, in words."""
+    residuals = sum(len(g.output) for g in design.tables.generators)
+    parts = [f"{plural(len(design.generators), 'residual generator')} with {plural(residuals, 'residual')}"] if design.generators else []
+    parts += [f"a {j.name} certificates" for j in judges(design) if j.kind == BANK]
+    isolating = sum(j.kind == HYPOTHESIS for j in judges(design))
+    return ", ".join([*parts, *([f"{plural(isolating, 'bank')} for isolation"] if isolating else [])])
 
 
 def _smallest(design: Design) -> dict[str, float]:
@@ -103,6 +116,14 @@ def _smallest(design: Design) -> dict[str, float]:
             name = design.model.faults[f].name
             best[name] = min(best.get(name, np.inf), float(size))
     return best
+
+
+def _ready_rest(g: GeneratorTable) -> int:
+    return g.ready_rest if g.zonotope is None else g.zonotope.ready_rest
+
+
+def _ready_moving(g: GeneratorTable) -> int:
+    return g.ready_moving if g.zonotope is None else g.zonotope.ready_moving
 
 
 # --- tables of the model ---------------------------------------------------------------------------------------------------
@@ -210,6 +231,7 @@ def _faults(design: Design) -> str:
     best = _smallest(design)
     for i, f in enumerate(design.model.faults):
         seen = [str(k + 1) for k, t in enumerate(design.tables.generators) if t.faults >> i & 1]
+        seen += [j.name for j, t in zip(judges(design), design.tables.judging, strict=True) if j.kind == BANK and t.faults >> i & 1]
         asked = best.get(f.name)
         rows.append([f.name, f.type, design.model.signals[f.signal].name, ", ".join(seen) or Cell("none", "bad"), "not asked for" if asked is None else num(asked)])
     return (
@@ -255,8 +277,9 @@ def _generator(design: Design, i: int, g: Generator) -> Iterator[str]:
     if g.filter.regularised > 0:
         yield f"<p><b>The factorisation was singular and is regularised</b>: noise of size {num(g.filter.regularised)} that no one claims was added to each row of Fb.</p>"
     yield _search(design, g)
-    yield _composition(names, g)
-    yield picture(_response_figure(g, names), f"h{i + 1}", f"Threshold of generator {i + 1}", _response_caption(g, names))
+    wide = names + uncertain_names(design)
+    yield _composition(wide, g)
+    yield picture(_response_figure(g, wide), f"h{i + 1}", f"Threshold of generator {i + 1}", _response_caption(g))
     yield picture(_bias_figure(g), f"p{i + 1}", f"Poles and start of generator {i + 1}", _bias_caption(g))
     yield _poles(g)
     o, f = g.observer, g.filter
@@ -317,11 +340,11 @@ def _composition(names: list[str], g: Generator) -> str:
     rows = []
     for i in range(len(g.tables.steady)):
         J = float(g.tables.steady[i])
-        rows.append([f"residual {i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)])
+        rows.append([f"residual\u00a0{i + 1}", J, percent(float(disturbance[i]) / J), *[percent(float(events[i, s]) / J) for s in shown], percent(float(rounding[i]) / J)])
     return table(
-        ["", "#steady J", "#disturbance", *[f"#events of {names[s]}" for s in shown], "#rounding"],
+        ["", "#steady J", "#disturbance", *[f"#{names[s]}" for s in shown], "#rounding"],
         rows,
-        "What the threshold is made of, once started and at the usual radii.",
+        "What the threshold is made of, once started and at the usual radii of the signals.",
     )
 
 
@@ -366,7 +389,7 @@ def _response_figure(g: Generator, names: list[str]) -> Figure:
         handles=handles,
         loc="upper left",
         bbox_to_anchor=(0.85 / total, 1 - 0.03 / height),
-        ncols=min(len(handles), 6),
+        ncols=min(len(handles), 6 if max(map(len, names)) <= LONG_NAME else 4),
         borderaxespad=0,
         columnspacing=1.4,
         handlelength=1.6,
@@ -375,7 +398,7 @@ def _response_figure(g: Generator, names: list[str]) -> Figure:
     return figure
 
 
-def _response_caption(g: Generator, names: list[str]) -> str:
+def _response_caption(g: Generator) -> str:
     taps = g.tables.weight.shape[0]
     active = int(np.sum(g.tables.weight.max((0, 1)) > 0))
     left = active - min(active, SIGNALS_MAX)

@@ -28,7 +28,8 @@ def show_limits(rows: Sequence[dict[str, Any]], start: int, model: str, scenario
     console = Console(file=file, highlight=False)
     if not console.is_terminal:
         console.width = WIDTH
-    console.print(f"{model}, {scenario}: mean delay in samples, fault from sample {start}")
+    partly = any(0 < n < row["runs"] for row in rows for n in row["found"].values())
+    console.print(f"{model}, {scenario}: mean delay in samples, fault from sample {start}" + ("; behind a slash the runs that found it, where not all did" if partly else ""))
     console.print(table)
 
 

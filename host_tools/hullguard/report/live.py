@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hullguard.design.design import Design
+from hullguard.design.judges import judges, residual_names
 
 PERIOD_S = 0.2
 ROWS_MAX = 12  # signals, and generators, that fit a screen
@@ -21,7 +22,13 @@ BAR = 24
 
 PLANT_STYLE = {"starting": "dim", "none": "bold blue", "provisional": "bold black on yellow", "confirmed": "bold white on red"}
 PLANT_SAYS = {"starting": "starting", "none": "no fault", "provisional": "fault, provisional", "confirmed": "fault confirmed"}
+ALARMED = ("provisional", "confirmed")
 BUS_STYLE = {"good": "blue", "absent": "dim", "lossy": "yellow", "stale": "bold magenta"}
+
+
+def may_be(plant: str, candidates: Sequence[str], known: bool) -> str:
+    """What an alarm says of its cause, to follow the state of the plant; nothing for a model that knows no faults."""
+    return "" if plant not in ALARMED or not known else f", may be {', '.join(candidates)}" if candidates else ", no single fault explains it"
 
 
 class LiveTable:
@@ -33,15 +40,16 @@ class LiveTable:
         self.drawn = 0
         self._model, self._samples = design.model.name, samples
         self._signals = [s.name for s in design.model.signals]
-        self._residuals = [f"r{g + 1}.{i + 1}" for g, t in enumerate(design.tables.generators) for i in range(len(t.output))]
+        self._residuals = residual_names(judges(design))
+        self._known = bool(design.model.faults)
         self._groups = [g.name for g in design.tables.groups]
         self._senders = max(1, len(self._groups) - 1)  # the frame that closes a sample is no measurement
         self._live: Live | None = None
-        self._said: tuple[str, tuple[tuple[str, str], ...]] | None = None
+        self._said: tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]] | None = None
         self._next = 0.0
         self._began = 0.0
         self._worst = [0.0] * len(self._residuals)
-        self._view: tuple[int, Sequence[float], Sequence[float], Sequence[float], str, Mapping[str, str], int] | None = None
+        self._view: tuple[int, Sequence[float], Sequence[float], Sequence[float], str, Mapping[str, str], int, Sequence[str]] | None = None
 
     def __enter__(self) -> Self:
         """Start drawing."""
@@ -60,30 +68,41 @@ class LiveTable:
                 self._live.stop()
                 self._live = None
 
-    def update(self, k: int, values: Sequence[float], radii: Sequence[float], ratios: Sequence[float], plant: str, bus: Mapping[str, str], frames: int) -> None:
-        """Sample k: what is known of each signal, |r|/J of each residual, the verdict, health of each group, measurement frames sent so far."""
+    def update(
+        self,
+        k: int,
+        values: Sequence[float],
+        radii: Sequence[float],
+        ratios: Sequence[float],
+        plant: str,
+        bus: Mapping[str, str],
+        frames: int,
+        candidates: Sequence[str] = (),
+    ) -> None:
+        """Sample k: what is known of each signal, |r|/J of each residual, the verdict, health of each group, measurement frames sent so far, candidate faults."""
         if not self.console.is_terminal:
-            self._say(k, plant, bus)
+            self._say(k, plant, bus, candidates)
             return
         for i, ratio in enumerate(ratios):
             self._worst[i] = max(self._worst[i], ratio)
         now = time.monotonic()
         changed = self._said is None or self._said[0] != plant
-        self._said = (plant, ())
+        self._said = (plant, (), ())
         if now < self._next and not (changed and now >= self._next - PERIOD_S / 2):
             # Kept as it is: copying every sample would cost more than the sample itself.
-            self._view = (k, values, radii, ratios, plant, bus, frames)
+            self._view = (k, values, radii, ratios, plant, bus, frames, candidates)
             return
-        self._view = (k, list(values), list(radii), list(ratios), plant, dict(bus), frames)
+        self._view = (k, list(values), list(radii), list(ratios), plant, dict(bus), frames, candidates)
         self._next = now + PERIOD_S
         self._draw()
 
-    def _say(self, k: int, plant: str, bus: Mapping[str, str]) -> None:
-        state = (plant, tuple((g, bus[g]) for g in self._groups if g in bus))
+    def _say(self, k: int, plant: str, bus: Mapping[str, str], candidates: Sequence[str]) -> None:
+        state = (plant, tuple((g, bus[g]) for g in self._groups if g in bus), tuple(candidates))
         if state != self._said:
             self._said = state
             health = ", ".join(f"{g} {h}" for g, h in state[1])
-            self.console.print(f"k={k} plant {plant}" + (f"; bus: {health}" if health else ""), markup=False, highlight=False, soft_wrap=True)
+            cause = may_be(plant, candidates, self._known)
+            self.console.print(f"k={k} plant {plant}{cause}" + (f"; bus: {health}" if health else ""), markup=False, highlight=False, soft_wrap=True)
 
     def _draw(self) -> None:
         if self._live is not None and self._view is not None:
@@ -92,7 +111,7 @@ class LiveTable:
 
     def _render(self) -> RenderableType:
         assert self._view is not None
-        k, values, radii, ratios, plant, bus, frames = self._view
+        k, values, radii, ratios, plant, bus, frames, candidates = self._view
         narrow = self.console.width < 72
         head = Table.grid(padding=(0, 2))
         rate = (k + 1) / max(time.monotonic() - self._began, 1e-9)
@@ -104,7 +123,8 @@ class LiveTable:
             Text(f"{rate:.0f} samples/s", style="dim"),
         )
         state = Table.grid(padding=(0, 1))
-        state.add_row("plant", Text().append(f" {PLANT_SAYS.get(plant, plant)} ", style=PLANT_STYLE.get(plant, "")))
+        cause = may_be(plant, candidates, self._known).removeprefix(",")
+        state.add_row("plant", Text().append(f" {PLANT_SAYS.get(plant, plant)} ", style=PLANT_STYLE.get(plant, "")).append(cause))
         health = Text()
         for g in self._groups:
             h = bus.get(g, "absent")

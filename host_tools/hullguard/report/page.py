@@ -80,8 +80,8 @@ p{margin:.4rem 0 .7rem;max-width:52rem}
 table{border-collapse:collapse;font-size:.88rem;font-variant-numeric:tabular-nums}
 caption{text-align:left;padding:0 0 .3rem}
 th,td{padding:4px 14px 4px 0;text-align:left;vertical-align:top;border-bottom:1px solid var(--grid)}
-th{font-weight:600;color:var(--muted);white-space:nowrap}
-td.n,th.n{text-align:right;white-space:nowrap}
+th{font-weight:600;color:var(--muted);vertical-align:bottom}
+th.n,td.n{text-align:right}td.n{white-space:nowrap}
 td.good{color:var(--good)}td.bad{color:var(--bad);font-weight:600}
 table.matrix{font:12px/1.45 ui-monospace,"DejaVu Sans Mono",Consolas,monospace;border-left:2px solid var(--edge);border-right:2px solid var(--edge)}
 table.matrix td{border:0;padding:0 8px;text-align:right;white-space:nowrap}

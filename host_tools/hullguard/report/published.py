@@ -21,7 +21,7 @@ TOP = 0.68  # above them: legend, name of the fault, title
 
 def section(run: Run) -> Iterator[str]:
     """The figures with their captions."""
-    after = [r.r for r in run.residuals]
+    after = [r.r for r in run.observing]
     event = [g for g in run.groups if not draw.is_every_sample(g, len(run.k))]
     yield "<h2>The figures of the publication</h2>"
     yield picture(
@@ -46,7 +46,7 @@ def section(run: Run) -> Iterator[str]:
         thresholds_figure(run),
         "thresholds",
         "Residuals with their thresholds",
-        f"{names(len(run.residuals))} within their thresholds ±J; a fault is declared when one of them leaves its threshold.",
+        f"{names(len(run.observing))} within their thresholds ±J; a fault is declared when one of them leaves its threshold.",
     )
 
 
@@ -104,10 +104,10 @@ def instants_figure(run: Run, groups: Sequence[GroupRun]) -> Figure:
 
 def thresholds_figure(run: Run) -> Figure:
     """A panel a residual."""
-    sheet = draw.Sheet([1.6] * len(run.residuals), 0.3, TOP)
+    sheet = draw.Sheet([1.6] * len(run.observing), 0.3, TOP)
     axes: list[Axes] = []
     w = draw.whole(run)
-    for i, r in enumerate(run.residuals):
+    for i, r in enumerate(run.observing):
         ax = sheet.add(1.6)
         draw.draw_residual(ax, run, w, r, f"R{i + 1}")
         draw.mark_faults(ax, run, w, labels=not axes)

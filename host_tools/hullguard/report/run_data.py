@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hullguard.design.judges import HYPOTHESIS, KINDS, OBSERVER, Judge, residual_columns, residual_names
 from hullguard.errors import InputError
 from hullguard.model.table import Array
 
@@ -31,7 +32,10 @@ class FaultRun:
     detected: int | None
     confirmed: int | None
     delay: float | None
-    candidates: tuple[str, ...]
+    fault: str | None  # the model's fault that it is
+    candidates: tuple[str, ...]  # when it was detected
+    narrowed_at: int | None  # since when a confirmed alarm left as few candidates as it ever did
+    narrowed_to: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,10 @@ class GroupRun:
 class Residual:
     """One residual and its threshold."""
 
-    name: str  # r1.2
-    generator: int  # 1 ..
+    name: str  # for people
+    column: str  # 1.2: in signals.csv
+    judge: int  # 1 ..
+    kind: str  # of the judge
     r: Array
     J: Array
     ratio: Array  # |r| / J, 0 where there is no threshold
@@ -69,6 +75,16 @@ class SignalRun:
 
 
 @dataclass(frozen=True)
+class VerdictRun:
+    """What the detector said from a sample on."""
+
+    k: int
+    plant: str
+    candidates: tuple[str, ...]
+    bus: dict[str, str]
+
+
+@dataclass(frozen=True)
 class Run:
     """Everything a report shows."""
 
@@ -82,11 +98,28 @@ class Run:
     bus: dict[str, Array]  # index into BUS, a sample
     bits: Array
     signals: tuple[SignalRun, ...]
+    judges: tuple[Judge, ...]
     residuals: tuple[Residual, ...]
-    before: tuple[Array, ...]  # each residual before its post-filter; none where the run did not ask for them
+    before: tuple[Array, ...]  # each residual of an observer before its post-filter; none where the run did not ask for them
     groups: tuple[GroupRun, ...]
     faults: tuple[FaultRun, ...]
-    verdicts: tuple[tuple[int, str, dict[str, str]], ...]
+    known_faults: tuple[str, ...]  # of the model
+    verdicts: tuple[VerdictRun, ...]
+
+    @property
+    def observing(self) -> tuple[Residual, ...]:
+        """The residuals of observers."""
+        return tuple(r for r in self.residuals if r.kind == OBSERVER)
+
+    @property
+    def detecting(self) -> tuple[Residual, ...]:
+        """The residuals that tell a fault from none: those of observers and banks for detection."""
+        return tuple(r for r in self.residuals if r.kind != HYPOTHESIS)
+
+    @property
+    def isolating(self) -> tuple[Residual, ...]:
+        """The residuals that tell one fault from another."""
+        return tuple(r for r in self.residuals if r.kind == HYPOTHESIS)
 
     def at(self, k: float) -> float:
         """Time of a sample."""
@@ -218,7 +251,10 @@ def _faults(top: _Json, labels: list[dict[str, str]]) -> tuple[FaultRun, ...]:
                 detected=f.count("detected_at"),
                 confirmed=f.count("confirmed_at"),
                 delay=f.maybe("delay"),
+                fault=None if f.raw("fault") is None else f.text("fault"),
                 candidates=tuple(str(c) for c in f.list("candidates")),
+                narrowed_at=f.count("narrowed_at"),
+                narrowed_to=tuple(str(c) for c in f.list("narrowed_to")),
             )
         )
     return tuple(found)
@@ -253,21 +289,33 @@ def _column(column: dict[str, Array], name: str, where: Path) -> Array:
     return column[name]
 
 
-def _residuals(column: dict[str, Array], where: Path) -> tuple[Residual, ...]:
+def _judges(top: _Json) -> tuple[Judge, ...]:
+    made = []
+    for i, data in enumerate(top.list("judges")):
+        j = _Json(data, f"{top.where}: judges[{i}]")
+        kind, count = j.text("kind"), j.number("residuals")
+        if kind not in KINDS:
+            raise InputError(f"{j.where}: kind '{kind}' is not one of {', '.join(KINDS)}")
+        if count < 1:
+            raise InputError(f"{j.where}: 'residuals' is {count:g}, expected at least 1")
+        made.append(Judge(j.text("name"), kind, round(count)))
+    if not made:
+        raise InputError(f"{top.where}: 'judges' is empty: no residual to show; run hullguard again to write it anew")
+    return tuple(made)
+
+
+def _residuals(judges: tuple[Judge, ...], column: dict[str, Array], where: Path) -> tuple[Residual, ...]:
     out = []
-    for name, r in column.items():
-        generator, dot, place = name[1:].partition(".")
-        if name.startswith("r") and dot and generator.isdigit() and place.isdigit():
-            J = _column(column, f"J{generator}.{place}", where)
-            usable = np.isfinite(r) & np.isfinite(J) & (J > 0)
-            ratio = np.where(usable, np.abs(r) / np.where(usable, J, 1.0), 0.0)
-            out.append(Residual(name, int(generator), r, J, ratio))
-    if not out:
-        raise InputError(f"{where}: column 'r1.1' is missing: no residual to show; run hullguard again to write it anew")
+    for name, place in zip(residual_names(judges), residual_columns(judges), strict=True):
+        r, J = _column(column, f"r{place}", where), _column(column, f"J{place}", where)
+        usable = np.isfinite(r) & np.isfinite(J) & (J > 0)
+        ratio = np.where(usable, np.abs(r) / np.where(usable, J, 1.0), 0.0)
+        judge = int(place.partition(".")[0])
+        out.append(Residual(name, place, judge, judges[judge - 1].kind, r, J, ratio))
     return tuple(out)
 
 
-def _verdicts(top: _Json) -> tuple[tuple[int, str, dict[str, str]], ...]:
+def _verdicts(top: _Json) -> tuple[VerdictRun, ...]:
     out = []
     for i, data in enumerate(top.list("verdicts")):
         v = _Json(data, f"{top.where}: verdicts[{i}]")
@@ -277,17 +325,17 @@ def _verdicts(top: _Json) -> tuple[tuple[int, str, dict[str, str]], ...]:
         for health in bus.values():
             if health not in BUS:
                 raise InputError(f"{v.where}: bus '{health}' is not one of {', '.join(BUS)}")
-        out.append((round(v.number("k")), plant, bus))
-    return tuple(sorted(out, key=lambda v: v[0]))
+        out.append(VerdictRun(round(v.number("k")), plant, tuple(str(c) for c in v.list("candidates")), bus))
+    return tuple(sorted(out, key=lambda v: v.k))
 
 
-def _bus(verdicts: tuple[tuple[int, str, dict[str, str]], ...], groups: tuple[GroupRun, ...], k: Array) -> dict[str, Array]:
+def _bus(verdicts: tuple[VerdictRun, ...], groups: tuple[GroupRun, ...], k: Array) -> dict[str, Array]:
     out = {}
     for g in groups:
         health = np.full(len(k), BUS.index("absent"))
-        for start, _, bus in verdicts:
-            if g.name in bus:
-                health[np.searchsorted(k, start) :] = BUS.index(bus[g.name])
+        for v in verdicts:
+            if g.name in v.bus:
+                health[np.searchsorted(k, v.k) :] = BUS.index(v.bus[g.name])
         out[g.name] = health
     return out
 
@@ -313,7 +361,7 @@ def read_run(directory: Path) -> Run:
         for s in [name.removesuffix(".value") for name in column if name.endswith(".value")]
     )
     groups, verdicts = _groups(top, column, where), _verdicts(top)
-    for key in ("model", "model_hash", "real", "bus", "scenario", "seed"):
+    for key in ("model", "model_hash", "real", "bus", "scenario", "seed", "threshold"):
         top.raw(key)
     for key in ("measurement", "periodic", "total", "bits", "bits_periodic", "load_mean", "load_p99", "load_bound"):
         top.object("frames").number(key)
@@ -322,8 +370,9 @@ def read_run(directory: Path) -> Run:
     for key in ("communication", "events"):
         top.object(key)
     top.maybe("margin_max")
-    residuals = _residuals(column, where)
-    before = tuple(_column(column, f"before{r.name[1:]}", where) for r in residuals) if top.data.get("figures") else ()
+    judges = _judges(top)
+    residuals = _residuals(judges, column, where)
+    before = tuple(_column(column, f"before{r.column}", where) for r in residuals if r.kind == OBSERVER) if top.data.get("figures") else ()
     sample_time_s, bitrate = top.number("sample_time_s"), top.number("bitrate")
     if sample_time_s <= 0 or bitrate <= 0:
         raise InputError(f"{path}: 'sample_time_s' and 'bitrate' must be above 0")
@@ -338,9 +387,11 @@ def read_run(directory: Path) -> Run:
         bus=_bus(verdicts, groups, k),
         bits=_column(column, "bits", where),
         signals=signals,
+        judges=judges,
         residuals=residuals,
         before=before,
         groups=groups,
         faults=_faults(top, labels),
+        known_faults=tuple(str(f) for f in top.list("known_faults")),
         verdicts=verdicts,
     )

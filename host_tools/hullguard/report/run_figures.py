@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation, Transform
 from numpy.typing import NDArray
 
+from hullguard.design.judges import OBSERVER
 from hullguard.model.table import Array
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RED, SKY
 from hullguard.report.run_data import BUS, PLANT, FaultRun, GroupRun, Residual, Run, SignalRun
@@ -217,27 +218,27 @@ def fault_legend(run: Run) -> list[Artist]:
 
 
 def chosen_residuals(run: Run, count: int = PANELS) -> tuple[list[Residual], int, int]:
-    """Residuals worth a panel, and how many residuals and generators are left out.
+    """Of observers and banks for detection the residuals worth a panel, and how many residuals and judges of theirs are left out.
 
-    First the generators that alarmed, the first to alarm first, then those that came closest to it.
+    First the judges that alarmed, the first to alarm first, then those that came closest to it.
     """
     rank: dict[int, tuple[float, float]] = {}
-    for r in run.residuals:
+    for r in run.detecting:
         over = np.flatnonzero(r.ratio > 1.0)
         key = (float(over[0]) if len(over) else np.inf, -float(r.ratio.max(initial=0.0)))
-        rank[r.generator] = min(rank.get(r.generator, (np.inf, 0.0)), key)
+        rank[r.judge] = min(rank.get(r.judge, (np.inf, 0.0)), key)
     shown: list[Residual] = []
     order = sorted(rank, key=lambda g: (*rank[g], g))
     for g in order:
-        mine = [r for r in run.residuals if r.generator == g]
+        mine = [r for r in run.detecting if r.judge == g]
         if len(mine) > count:
             closest = sorted(mine, key=lambda r: -float(r.ratio.max(initial=0.0)))[:count]
             mine = [r for r in mine if any(r is c for c in closest)]
         if len(shown) + len(mine) > count and shown:
             break
         shown += mine
-    left = {r.generator for r in run.residuals} - {r.generator for r in shown}
-    return shown, len(run.residuals) - len(shown), len(left)
+    left = {r.judge for r in run.detecting} - {r.judge for r in shown}
+    return shown, len(run.detecting) - len(shown), len(left)
 
 
 def _residual_limit(r: Residual, w: Window, plant: Array) -> float:
@@ -253,16 +254,21 @@ def _residual_limit(r: Residual, w: Window, plant: Array) -> float:
 
 
 def draw_residual(ax: Axes, run: Run, w: Window, r: Residual, name: str = "") -> None:
-    """One residual within its threshold, under another name if there is one."""
+    """One residual within its threshold, under another name if there is one.
+
+    Of a bank it is |r|: the sign says nothing where the certificate may be another one in every sample.
+    """
     t, rows = run.time[w.rows], w.rows
     _limits(ax, run, w)
     top = _residual_limit(r, w, run.plant)
     J = np.where(np.isfinite(r.J[rows]), r.J[rows], 10 * top)
-    band(ax, t, np.maximum(-J, -2 * top), np.minimum(J, 2 * top), SKY, 0.17, 1.0, step=False)
-    for sign in (1.0, -1.0):
+    one_sided = r.kind != OBSERVER
+    values = np.abs(r.r[rows]) if one_sided else r.r[rows]
+    band(ax, t, np.zeros_like(J) if one_sided else np.maximum(-J, -2 * top), np.minimum(J, 2 * top), SKY, 0.17, 1.0, step=False)
+    for sign in (1.0,) if one_sided else (1.0, -1.0):
         line(ax, t, sign * np.minimum(J, 2 * top), INK, width=0.8, order=2.2, alpha=0.3)
-    line(ax, t, np.clip(r.r[rows], -2 * top, 2 * top), BLUE, width=1.2, order=2.5)
-    ax.set_ylim(-top, top)
+    line(ax, t, np.clip(values, -2 * top, 2 * top), BLUE, width=1.2, order=2.5)
+    ax.set_ylim(0.0 if one_sided else -top, top)
     _number_ticks(ax)
     quiet = r.ratio[rows]
     first = min((f.start for f in run.faults), default=None)
@@ -274,7 +280,7 @@ def draw_residual(ax: Axes, run: Run, w: Window, r: Residual, name: str = "") ->
         if first is not None
         else f"largest |r|/J {quiet.max(initial=0.0):.2f}"
     )
-    heading(ax, name or r.name, more + (", cut at the frame" if cut else ""))
+    heading(ax, (name or r.name) + (": |r|" if one_sided else ""), more + (", cut at the frame" if cut else ""))
 
 
 def residual_legend(run: Run) -> list[Artist]:
@@ -297,19 +303,20 @@ def residual_figure(run: Run, w: Window, residuals: Sequence[Residual]) -> Figur
     return sheet.figure
 
 
-def ratio_figure(run: Run, w: Window) -> Figure:
-    """All residuals at once: |r|/J as colour."""
-    n = len(run.residuals)
+def ratio_figure(run: Run, w: Window, residuals: Sequence[Residual]) -> Figure:
+    """Many residuals at once: |r|/J as colour."""
+    n = len(residuals)
     height = max(0.6, min(0.17 * n, 4.0))
     sheet = Sheet([height], 0.0, _top(run, heading=False))
-    ax = sheet.add(height, right=1.0)
+    left = _name_margin([r.name for r in residuals])
+    ax = sheet.add(height, left=left, right=1.0)
     edges = _edges(w.size, BINS)
-    data = np.array([np.maximum.reduceat(r.ratio[w.rows], edges) for r in run.residuals])
+    data = np.array([np.maximum.reduceat(r.ratio[w.rows], edges) for r in residuals])
     shades = LinearSegmentedColormap.from_list("ratio", ["#eef4f8", "#9ccbe6", "#3f8fc0", "#0d4f80"]).with_extremes(over="#f08c00")
     low, high = float(run.time[w.first]), float(run.time[w.last - 1]) + run.sample_time_s
     image = ax.imshow(data, aspect="auto", interpolation="nearest", cmap=shades, vmin=0.0, vmax=1.0, extent=(low, high, n - 0.5, -0.5))
     ax.grid(False)
-    ax.set_yticks(range(n), [r.name for r in run.residuals], fontsize=7.5 if n > 10 else 8)
+    ax.set_yticks(range(n), [r.name for r in residuals], fontsize=7.5 if n > 10 else 8)
     ax.set_xlabel("time (s)")
     bar = ax.inset_axes((1.02, 0.0, 0.016, 1.0))
     drawn = sheet.figure.colorbar(image, cax=bar, extend="max", ticks=[0, 0.5, 1])
@@ -320,7 +327,7 @@ def ratio_figure(run: Run, w: Window) -> Figure:
     handles: list[Artist] = [Patch(facecolor="#f08c00", label="above its threshold")]
     if any(f.detected is not None for f in run.faults):
         handles.append(Line2D([], [], color=RED, marker="v", ls="", ms=5, mew=0, label="detected"))
-    sheet.legend(handles)
+    sheet.legend(handles, left)
     return sheet.figure
 
 
@@ -548,7 +555,8 @@ def verdict_figure(run: Run, w: Window) -> Figure:
     rows = 1 + len(run.groups)
     height = 0.12 + 0.27 * rows
     sheet = Sheet([height], 0.0, _top(run, heading=False))
-    ax = sheet.add(height, left=_name_margin([f"bus: {g.name}" for g in run.groups]))
+    left = _name_margin([f"bus: {g.name}" for g in run.groups])
+    ax = sheet.add(height, left=left)
     draw_verdict(ax, run, w)
     ax.set_xlabel("time (s)")
     for f in run.faults:
@@ -556,7 +564,61 @@ def verdict_figure(run: Run, w: Window) -> Figure:
             if k is not None and k < run.k[-1]:
                 ax.axvline(run.at(k), color=PINK, lw=1.2, zorder=1)  # behind the bars
     mark_faults_above(ax, run)
-    sheet.legend(verdict_legend(run))
+    sheet.legend(verdict_legend(run), left)
+    return sheet.figure
+
+
+# --- candidates ----------------------------------------------------------------------------------------------------------
+
+ALARM_FILL = {name: PLANT_FILL[name] for name in ("provisional", "confirmed")}
+NO_SINGLE = "no single fault"
+
+
+def candidates(run: Run) -> dict[str, Array]:
+    """For each fault of the model, and for the case that none explains all alarms: index into PLANT where it is a candidate, 0 elsewhere, a sample."""
+    state = {name: np.zeros(len(run.k), dtype=int) for name in (*run.known_faults, NO_SINGLE)}
+    ends = [v.k for v in run.verdicts[1:]] + [run.k[-1] + 1]
+    for v, end in zip(run.verdicts, ends, strict=True):
+        if v.plant in ALARM_FILL:
+            rows = slice(*np.searchsorted(run.k, [v.k, end]))
+            for name in v.candidates or (NO_SINGLE,):
+                state[name][rows] = PLANT.index(v.plant)
+    if not state[NO_SINGLE].any():
+        del state[NO_SINGLE]
+    return state
+
+
+def draw_candidates(ax: Axes, run: Run, w: Window, state: dict[str, Array]) -> None:
+    """A row a fault of the model; a box marks where the fault was injected."""
+    _limits(ax, run, w)
+    for i, values in enumerate(state.values()):
+        _bars(ax, run, w, len(state) - 1 - i, values, PLANT, ALARM_FILL, {})
+    for f in run.faults:
+        if f.fault in state:
+            row = len(state) - 1 - list(state).index(f.fault)
+            start, end = run.at(f.start), run.end if f.end is None else run.at(f.end)
+            ax.broken_barh([(start, end - start)], (row - 0.46, 0.92), facecolors="none", edgecolors=PINK, lw=1.6, zorder=5)
+    ax.set_ylim(-0.6, len(state) - 0.4)
+    ax.set_yticks(range(len(state) - 1, -1, -1), list(state))
+    ax.tick_params(axis="y", length=0)
+    ax.grid(False, axis="y")
+
+
+def candidate_figure(run: Run, w: Window) -> Figure:
+    """Which fault it may be, in time."""
+    state = candidates(run)
+    height = 0.12 + 0.25 * len(state)
+    sheet = Sheet([height], 0.0, _top(run, heading=False))
+    left = _name_margin(list(state))
+    ax = sheet.add(height, left=left)
+    draw_candidates(ax, run, w, state)
+    ax.set_xlabel("time (s)")
+    mark_faults_above(ax, run)
+    seen = {PLANT[i] for values in state.values() for i in np.unique(values)}
+    handles: list[Artist] = [Patch(facecolor=fill, label=f"candidate, {name}") for name, (fill, _) in ALARM_FILL.items() if name in seen]
+    if any(f.fault in state for f in run.faults):
+        handles.append(Patch(facecolor="none", edgecolor=PINK, lw=1.6, label="fault present"))
+    sheet.legend(handles, left)
     return sheet.figure
 
 
@@ -624,12 +686,14 @@ def signal_figure(run: Run, w: Window) -> Figure:
 
 
 def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
-    """Residuals, events and verdict below one another."""
+    """Residuals, events, verdict and, where banks isolate, candidate faults below one another."""
     residuals = near(run, w, chosen_residuals(run)[0], count)
     raster = 0.12 + 0.26 * len(run.groups)
     bars = 0.12 + 0.25 * (1 + len(run.groups))
-    sheet = Sheet([1.35] * len(residuals) + [raster, bars], 0.34, _top(run, 0.3), 0.5, 10.0)
-    left = _name_margin([f"bus: {g.name}" for g in run.groups])
+    state = candidates(run) if run.isolating else {}
+    causes = [0.12 + 0.22 * len(state)] if state else []
+    sheet = Sheet([1.35] * len(residuals) + [raster, bars, *causes], 0.34, _top(run, 0.3), 0.5, 10.0)
+    left = _name_margin([f"bus: {g.name}" for g in run.groups] + list(state))
     axes = []
     for i, r in enumerate(residuals):
         ax = sheet.add(1.35, left=left)
@@ -657,6 +721,11 @@ def overview_figure(run: Run, w: Window, count: int = 3) -> Figure:
         handletextpad=0.4,
     )
     axes.append(ax)
+    for height in causes:
+        ax = sheet.add(height, left=left)
+        draw_candidates(ax, run, w, state)
+        heading(ax, "which fault it may be")
+        axes.append(ax)
     _times(axes)
     sheet.legend(residual_legend(run), left=left)
     return sheet.figure

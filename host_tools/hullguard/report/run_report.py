@@ -8,7 +8,9 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from hullguard.design.judges import BANK
 from hullguard.errors import InputError
+from hullguard.model.detector import PUBLISHED
 from hullguard.report import published
 from hullguard.report import run_figures as draw
 from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
@@ -33,11 +35,22 @@ GUARANTEE = (
     "states, and no corrupted frame passes its end-to-end check, no residual can exceed its threshold, whatever is sent late, lost or not at all; so a "
     "confirmed fault means that the plant or one of these bounds is broken."
 )
+UNSOUND = (
+    "Not guaranteed here: that there is no false alarm. The threshold is the publication's zonotope, which drops generators instead of covering them and so can be "
+    "smaller than what a healthy plant can show. It is there for comparison; detector.threshold exact or zonotope gives the guarantee."
+)
 LIMITS = (
     "Not guaranteed: that every fault is found (one that stays below the thresholds is not), or that frames are authentic: the check protects against errors, "
     "not against an attacker."
 )
+CLOSEST = " Of a bank |r| of the certificate with the largest |r|/J is shown; it may be another one in every sample."
+CANDIDATES = (
+    "A fault is a candidate as long as it alone can explain every alarm of an episode. Confirmed alarms exclude for good; what a provisional one "
+    "excludes may come back. With a single fault present, it is among the candidates whenever the alarm is confirmed."
+)
+HYPOTHESES = "Above its threshold “not X” has shown that no course of fault X explains what was received."
 MOVING = "The threshold moves: it is the largest value a healthy plant can show, given what the detector knows."
+MOVING_PUBLISHED = "The threshold moves with what the detector knows."
 BAND = "The detector works on values and radii only: the true reading has to lie in the band. A sensor's fault is in the reading that is sent, and in the band."
 
 
@@ -75,17 +88,16 @@ def _write(path: Path, data: bytes) -> None:
 def _body(run: Run) -> Iterator[str]:
     yield from _summary(run)
     whole = draw.whole(run)
-    many = len({r.generator for r in run.residuals})
-    shown, hidden, generators = draw.chosen_residuals(run)
+    shown, hidden, judges = draw.chosen_residuals(run)
     if run.before:
         yield from published.section(run)
 
     yield "<h2>Residuals and thresholds</h2>"
     left = ""
     if hidden:
-        whose = f" ({plural(generators, 'generator')} as a whole)" if generators else ""
+        whose = f" ({plural(judges, 'generator')} as a whole)" if judges else ""
         left = f" {plural(hidden, 'residual')} not drawn here{whose}: those drawn alarmed first or came closest to their thresholds."
-    yield f"<p>A fault is declared when a residual leaves its threshold. {MOVING}{esc(left)}</p>"
+    yield f"<p>A fault is declared when a residual leaves its threshold. {MOVING_PUBLISHED if run.info['threshold'] == PUBLISHED else MOVING}{esc(left)}</p>"
     zoom = draw.close_up(run)
     if zoom:
         w, fault = zoom
@@ -100,14 +112,15 @@ def _body(run: Run) -> Iterator[str]:
         draw.residual_figure(run, whole, shown),
         "residuals",
         "Residuals within their thresholds",
-        f"Residuals rG.I (generator G, dimensionless) within ±J over the whole run.{long}",
+        f"Residuals, dimensionless, within ±J over the whole run.{CLOSEST if any(r.kind == BANK for r in shown) else ''}{long}",
     )
-    if len(run.residuals) > 3:
+    if len(run.detecting) > 3:
+        many = len({r.judge for r in run.detecting})
         yield picture(
-            draw.ratio_figure(run, whole),
+            draw.ratio_figure(run, whole, run.detecting),
             "ratios",
             "All residuals relative to their thresholds",
-            f"All {len(run.residuals)} residuals of {many} generators: |r|/J, the largest of each column.",
+            f"All {len(run.detecting)} residuals of {many} generators: |r|/J, the largest of each column.",
         )
 
     yield "<h2>Verdict</h2>"
@@ -118,6 +131,7 @@ def _body(run: Run) -> Iterator[str]:
         "What the detector said of the plant, and of the frames of each group, over the whole run. Where changes are too close to draw, the worst one shows.",
     )
     yield from _verdict_table(run)
+    yield from _causes(run, whole, zoom[0] if zoom else None)
 
     yield "<h2>Events on the bus</h2>"
     yield picture(
@@ -148,6 +162,27 @@ def _body(run: Run) -> Iterator[str]:
     yield _communication(run)
     yield "<h2>The run</h2>"
     yield _facts(run)
+
+
+def _causes(run: Run, whole: draw.Window, zoom: draw.Window | None) -> Iterator[str]:
+    """Which fault it may be, and how the others were excluded."""
+    if not run.known_faults:
+        return
+    yield "<h2>Which fault it may be</h2>"
+    yield f"<p>{esc(CANDIDATES)}</p>"
+    if not any(v.plant in draw.ALARM_FILL for v in run.verdicts):
+        yield "<p>There was no alarm, so there is no candidate.</p>"
+    else:
+        for w, name in ((zoom, "candidates-near"), (whole, "candidates")):
+            if w is not None:
+                yield picture(draw.candidate_figure(run, w), name, "Candidate faults", "When each fault of the model was a candidate" + (", close up." if w is zoom else "."))
+    if run.isolating:
+        yield picture(
+            draw.ratio_figure(run, whole, run.isolating),
+            "hypotheses",
+            "Hypotheses relative to their thresholds",
+            f"The {plural(len(run.isolating), 'bank')} of the hypotheses: |r|/J of the certificate that is closest to its threshold, the largest of each column. {HYPOTHESES}",
+        )
 
 
 # --- summary -------------------------------------------------------------------------------------------------------------
@@ -203,7 +238,7 @@ def _summary(run: Run) -> Iterator[str]:
     yield '<div class="tiles">' + "".join(_tiles(run)) + "</div>"
     if run.faults:
         yield _fault_table(run)
-    yield f'<aside><p>{esc(GUARANTEE)}</p><p class="note">{esc(LIMITS)}</p></aside>'
+    yield f'<aside><p>{esc(UNSOUND if info["threshold"] == PUBLISHED else GUARANTEE)}</p><p class="note">{esc(LIMITS)}</p></aside>'
 
 
 def _tiles(run: Run) -> Iterator[str]:
@@ -228,7 +263,7 @@ def _tiles(run: Run) -> Iterator[str]:
         delays = [d for d in (delay_of(f) for f in found) if d is not None]
         if delays:
             mean = sum(delays) / len(delays)
-            longest = "" if len(delays) == 1 else f", longest {num(max(delays))} samples"
+            longest = "" if len(delays) == 1 else f", longest {plural(round(max(delays)), 'sample')}"
             yield tile("delay (samples)" if len(delays) == 1 else "mean delay (samples)", num(mean), f"{num(mean * run.sample_time_s)} s{longest}")
     alarms = info["false_alarms"]
     confirmed, provisional = round(alarms["confirmed"]), round(alarms["provisional"])
@@ -252,8 +287,14 @@ def _fault_table(run: Run) -> str:
         found: object = Cell("not found", "bad") if f.detected is None else f.detected
         delay = delay_of(f)
         until = "end" if f.end is None else f.end
-        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, ", ".join(f.candidates) or "–"])
+        rows.append([f.label, f.spec, f.start, until, found, f.confirmed, delay, None if delay is None else delay * run.sample_time_s, _named(f)])
     return table(["", "fault", "#start", "#until", "#detected", "#confirmed", "#delay (samples)", "#delay (s)", "candidates named"], rows)
+
+
+def _named(f: FaultRun) -> str:
+    """Candidates when the fault was detected, and what later alarms left of them."""
+    first = ", ".join(f.candidates) or "–"
+    return first if f.narrowed_at is None or f.narrowed_to == f.candidates else f"{first}; from k = {f.narrowed_at} {', '.join(f.narrowed_to) or draw.NO_SINGLE}"
 
 
 # --- tables --------------------------------------------------------------------------------------------------------------
@@ -295,10 +336,11 @@ def _communication(run: Run) -> str:
 
 
 def _verdict_table(run: Run) -> Iterator[str]:
-    rows = [[k, num(k * run.sample_time_s, 6), plant, ", ".join(f"{g} {h}" for g, h in bus.items())] for k, plant, bus in run.verdicts[:VERDICTS_MAX]]
+    rows = [[v.k, num(v.k * run.sample_time_s, 6), v.plant, ", ".join(v.candidates) or "–", ", ".join(f"{g} {h}" for g, h in v.bus.items())] for v in run.verdicts[:VERDICTS_MAX]]
     more = "" if len(run.verdicts) <= VERDICTS_MAX else f"The first {VERDICTS_MAX} of {len(run.verdicts)}; all are in run.json."
     if rows:
-        yield (f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>" + table(["#sample", "#time (s)", "plant", "bus"], rows, more) + "</details>")
+        drawn = table(["#sample", "#time (s)", "plant", "may be", "bus"], rows, more)
+        yield f"<details><summary>{plural(len(run.verdicts), 'change')} of the verdict</summary>{drawn}</details>"
 
 
 def _facts(run: Run) -> str:
@@ -311,5 +353,6 @@ def _facts(run: Run) -> str:
         ["arithmetic", info["real"]],
         ["bus", f"{info['bus']}, {num(run.bitrate / 1000)} kbit/s"],
         ["signals, groups, residuals", f"{len(run.signals)}, {len(run.groups)}, {len(run.residuals)}"],
+        ["judged by", ", ".join(j.name for j in run.judges)],
     ]
     return table(["", ""], rows) + '<p class="note">All numbers come from run.json and signals.csv in the same directory; the same seed gives the same run.</p>'
