@@ -72,8 +72,9 @@ def describe(result: dict[str, Any]) -> Iterator[str]:
             delay += "" if case.get("limit") is None else f", limit {case['limit']:.2f}"
             yield f"{case['name'] if many else ', '.join(case['faults'])}: found in {case['detected_runs']} of {case['runs']} runs, {delay}"
             if "isolated_runs" in case:
-                others = ", ".join(f"{name} {count}" for name, count in case["candidates_later"].items())
-                yield f"    always a candidate in {case['true_candidate_runs']}, the only one within {LATER} samples after detection in {case['isolated_runs']}; left by then: {others or 'none'}"
+                left = ", ".join(f"{name} {count}" for name, count in case["candidates_later"].items()) or "none"
+                alone = f"the only one within {LATER} samples after detection in {case['isolated_runs']}"
+                yield f"    always a candidate in {case['true_candidate_runs']}, {alone}; left by then: {left}"
         elif many:
             yield f"{case['name']}: {case['provisional_alarm_runs']} runs with a provisional alarm, {case['false_alarm_runs']} confirmed"
 

@@ -444,7 +444,8 @@ class Recording:
 
 RESULT = (
     *("measurement", "closing", "verdicts", "lost", "silent", "bits", "measurement_bits", "provisional_at", "confirmed_at"),
-    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_settled", "margin_after", "candidates", "candidates_later", "candidates_always", "plant"),
+    *("false_provisional", "false_confirmed", "interval_min", "interval_max", "margin", "margin_settled", "margin_after"),
+    *("candidates", "candidates_later", "candidates_always", "plant"),
 )
 
 
