@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -14,6 +11,7 @@ import numpy as np
 
 from hullguard.campaign.case import COLUMNS, Case, Rows, chunk, runs_a_chunk
 from hullguard.campaign.chunks import Chunks
+from hullguard.campaign.tasks import deaf
 
 
 @dataclass(frozen=True)
@@ -33,19 +31,6 @@ def serial(tasks: Sequence[Task]) -> Iterator[tuple[Task, Rows]]:
     """One after another, in this process."""
     for t in tasks:
         yield t, chunk(t.case, t.first, t.count)
-
-
-@contextlib.contextmanager
-def deaf() -> Iterator[None]:
-    """Processes started in here do not hear Ctrl-C: it is the parent's to end them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def processes(workers: int) -> Way:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import signal
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any, TypeVar
 
 import numpy as np
@@ -55,6 +56,19 @@ class Emulator:
         return np.array(rows)
 
 
+@contextlib.contextmanager
+def deaf() -> Iterator[None]:
+    """Processes started in here do not hear Ctrl-C: it is the parent's to end them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _enter(begin: Callable[[Any], Any], job: Any) -> None:
     _context["made"] = begin(job)
 
@@ -73,7 +87,8 @@ def each(begin: Callable[[Job], Context], work: Callable[[Context, Item], Result
         return results
     with ProcessPoolExecutor(min(workers, len(items)), mp_context=multiprocessing.get_context("spawn"), initializer=_enter, initargs=(begin, job)) as pool:
         try:
-            waiting = _submitted(pool, work, items)
+            with deaf():  # the first tasks start the workers
+                waiting = [pool.submit(_one, work, item) for item in items]
             for done in as_completed(waiting):
                 done.result()
                 tick(1)
@@ -81,14 +96,3 @@ def each(begin: Callable[[Job], Context], work: Callable[[Context, Item], Result
             pool.shutdown(cancel_futures=True)
             raise
         return [done.result() for done in waiting]
-
-
-def _submitted(pool: ProcessPoolExecutor, work: Callable[[Any, Any], Any], items: Sequence[Any]) -> list[Future[Any]]:
-    """The first tasks start the workers, which must not hear Ctrl-C: it is the parent's to end them."""
-    if threading.current_thread() is not threading.main_thread():
-        return [pool.submit(_one, work, item) for item in items]
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        return [pool.submit(_one, work, item) for item in items]
-    finally:
-        signal.signal(signal.SIGINT, before)
