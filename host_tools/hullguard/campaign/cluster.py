@@ -8,8 +8,9 @@ import logging
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from hullguard.campaign.campaign import Task, Way, deaf
+from hullguard.campaign.campaign import Task, Way
 from hullguard.campaign.case import Rows, chunk
+from hullguard.campaign.tasks import deaf
 from hullguard.errors import InputError
 
 PATIENCE_S = 10.0
