@@ -681,7 +681,9 @@ def expected_numbers(d: Design) -> Numbers:
     numbers += _each("banks", len(t.banks)) + [p for b in t.banks for p in _bank(b)]
     judging = (*t.generators, *t.banks)
     numbers += _each("decisions", len(judging)) + _each("feeds", tuple(g.feeds for g in judging)) + _each("faults", tuple(g.faults for g in judging))
-    numbers += _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("values", t.window) + _each("all_residuals", t.residuals)
+    numbers += (
+        _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("values", t.window) + _each("all_residuals", t.residuals)
+    )
     numbers += _each("codes", 2 * t.signals) + [(tag, float(t.reals)) for tag in ("reals", "needed", "stored")]
     numbers += [(tag, float(t.sums)) for tag in ("sums", "needed", "stored")]
     numbers += _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
