@@ -16,6 +16,7 @@ from cantools.database.can import Database, Message
 from hullguard.codegen import emit_c, emit_dbc, write_all
 from hullguard.codegen.c import fill, real
 from hullguard.codegen.dbc import short
+from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design, design
 from hullguard.design.tables import (
     EXTENDED,
@@ -23,10 +24,15 @@ from hullguard.design.tables import (
     FLOAT32,
     MOTOROLA,
     SIGNED,
+    GeneratorTable,
     GroupTable,
     MessageTable,
+    MismatchTable,
+    PredictTable,
     SignalTable,
+    Tables,
 )
+from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.schema import load_model
 
@@ -188,17 +194,10 @@ static void group(const hg_hold_config *hold, const hg_message *frame, const hg_
     rs("middle", hold->middle, t->width);
 }
 
-static void generator(const hg_residual_config *g, const hg_hull_config *h)
+static void hull(const hg_hull_config *h)
 {
-    u("order", g->order);
-    u("residuals", g->residuals);
-    u("width", g->width);
-    us("signal", g->signal, g->width);
-    matrix("state", &g->state);
-    matrix("input", &g->input);
-    matrix("output", &g->output);
-    matrix("direct", &g->direct);
-    u("same", (h->residuals == g->residuals) && (h->width == g->width) && (memcmp(h->signal, g->signal, g->width) == 0));
+    u("wide", h->width);
+    us("wide", h->signal, h->width);
     u("taps", h->taps);
     rs("weight", h->weight, (unsigned)h->taps * h->residuals * h->width);
     u("settle", h->settle);
@@ -211,26 +210,135 @@ static void generator(const hg_residual_config *g, const hg_hull_config *h)
     rs("tail_output", h->tail_output, h->residuals);
 }
 
+static void zonotope(const hg_zonotope_config *z)
+{
+    unsigned of_state = 0U;
+    for (unsigned i = 0U; i < z->blocks; i++) { of_state += (unsigned)z->block[i] * z->block[i]; }
+    u("wide", z->width);
+    us("wide", z->signal, z->width);
+    u("order", z->order);
+    u("columns", z->columns);
+    u("reduction", (uint64_t)z->reduction);
+    u("blocks", z->blocks);
+    us("block", z->block, z->blocks);
+    rs("state", z->state, of_state);
+    rs("input", z->input, (unsigned)z->width * z->order);
+    u("disturbances", z->disturbances);
+    rs("disturbance", z->disturbance, (unsigned)z->disturbances * z->order);
+    u("initial", z->initial);
+    rs("rest", z->rest, (unsigned)z->initial * z->order);
+    rs("moving", z->moving, (unsigned)z->initial * z->order);
+    rs("output", z->output, (unsigned)z->residuals * z->order);
+    rs("outer", z->outer, (unsigned)z->residuals * z->order);
+    rs("direct", z->direct, (unsigned)z->residuals * z->width);
+    u("settle", z->settle);
+    rs("bias_rest", z->bias_rest, (unsigned)z->settle * z->residuals);
+    rs("bias_moving", z->bias_moving, (unsigned)z->settle * z->residuals);
+    rs("decay", z->decay, z->blocks);
+    rs("always", z->always, z->order);
+    rs("growth", z->growth, z->order);
+    rs("output_growth", z->output_growth, z->residuals);
+    u("recover", z->recover);
+    u("ready_rest", z->ready_rest);
+    u("ready_moving", z->ready_moving);
+}
+
+static void predictor(const hg_predict_config *p)
+{
+    u("group", p->group);
+    u("first", p->first);
+    u("order", p->order);
+    u("width", p->width);
+    u("inputs", p->inputs);
+    us("input", p->input, p->inputs);
+    rs("known", p->known, p->inputs);
+    matrix("correct", &p->correct);
+    matrix("state", &p->state);
+    matrix("drive", &p->drive);
+    matrix("output", &p->output);
+    matrix("direct", &p->direct);
+    rs("fresh", p->fresh, p->width);
+    u("horizon", p->horizon);
+    rs("radius", p->radius, (unsigned)p->horizon * p->width);
+    u("settle", p->settle);
+}
+
+static void uncertain(const hg_mismatch_config *m)
+{
+    u("states", m->states);
+    u("width", m->width);
+    us("signal", m->signal, m->width);
+    rs("constant", m->constant, m->states);
+    rs("gain", m->gain, (unsigned)m->states * m->width);
+}
+
+static void certificates(const hg_bank_config *b)
+{
+    const unsigned n = (unsigned)b->window * b->certificates;
+    u("certificates", b->certificates);
+    u("window", b->window);
+    u("width", b->width);
+    us("signal", b->signal, b->width);
+    rs("weight", b->weight, n * b->width);
+    rs("bias", b->bias, b->certificates);
+    r("widen", b->widen);
+    u("extras", b->extras);
+    us("extra", b->extra, b->extras);
+    rs("extra_weight", b->extra_weight, n * b->extras);
+}
+
+static void generator(const hg_residual_config *g, const hg_hull_config *h, const hg_zonotope_config *z)
+{
+    u("order", g->order);
+    u("residuals", g->residuals);
+    u("width", g->width);
+    us("signal", g->signal, g->width);
+    matrix("state", &g->state);
+    matrix("input", &g->input);
+    matrix("output", &g->output);
+    matrix("direct", &g->direct);
+    u("threshold", (h != NULL) ? h->residuals : z->residuals);
+    if (h != NULL) {
+        hull(h);
+    } else {
+        zonotope(z);
+    }
+}
+
 static void dump(void)
 {
     const hg_detector_config *d = CONFIG.detector;
     u("signals", d->signals);
+    u("all_signals", d->width);
     u("groups", d->groups);
     for (unsigned i = 0U; i < d->groups; i++) { group(&d->hold[i], &CONFIG.message[i], &SENDER[i]); }
     u("generators", d->generators);
-    for (unsigned i = 0U; i < d->generators; i++) { generator(&d->residual[i], &d->hull[i]); }
+    u("either", (d->hull == NULL) != (d->zonotope == NULL));
+    for (unsigned i = 0U; i < d->generators; i++) {
+        generator(&d->residual[i], (d->hull != NULL) ? &d->hull[i] : NULL, (d->zonotope != NULL) ? &d->zonotope[i] : NULL);
+    }
+    u("predictors", d->predictors);
+    for (unsigned i = 0U; i < d->predictors; i++) { predictor(&d->predict[i]); }
+    u("uncertain", d->mismatch != NULL);
+    if (d->mismatch != NULL) { uncertain(d->mismatch); }
+    u("banks", d->banks);
+    for (unsigned i = 0U; i < d->banks; i++) { certificates(&d->bank[i]); }
     u("decisions", d->decision.generators);
-    us("feeds", d->decision.feeds, d->generators);
-    for (unsigned i = 0U; i < d->generators; i++) { u("faults", d->decision.faults[i]); }
+    us("feeds", d->decision.feeds, d->decision.generators);
+    for (unsigned i = 0U; i < d->decision.generators; i++) { u("faults", d->decision.faults[i]); }
     u("up", d->decision.up);
     u("down", d->decision.down);
     u("latch", d->decision.latch);
     u("history", d->history);
+    u("values", d->window);
     u("all_residuals", d->residuals);
     u("codes", d->codes);
     u("reals", d->reals);
     u("needed", hg_detector_reals(d));
     u("stored", sizeof node.real / sizeof node.real[0]);
+    u("sums", d->sums);
+    u("needed", hg_detector_sums(d));
+    u("stored", SUMS);
     u("closing", CONFIG.closing);
     message(CONFIG.verdict);
     message(CONFIG.status);
@@ -310,16 +418,25 @@ def changed_places(d: Design) -> Design:
     return replace(d, tables=replace(d.tables, groups=(replace(first, signals=signals), *rest)))
 
 
+# All that a design may have beside observers and hulls; banks of the shipped one, whatever else is asked for.
+UNCERTAIN = {"plant.drag_per_s": {"value": 1.0, "pm": 0.1}, "detector.prediction": True}
+EVERYTHING = UNCERTAIN | {"detector.threshold": "zonotope"}
+
+
 @pytest.fixture(scope="module")
 def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
-    """The shipped model, the small one, and one with fields of another kind."""
+    """Shipped models, the small one, one with fields of another kind, and those with every other part."""
     path = tmp_path_factory.mktemp("models") / "tank.toml"
     path.write_text(TANK, encoding="utf-8")
     platoon = design(load_model("platoon"))[0]
-    return {"platoon": platoon, "tank": design(load_model(str(path)))[0], "places": changed_places(platoon)}
+    made = {"platoon": platoon, "tank": design(load_model(str(path)))[0], "places": changed_places(platoon), "bank": design(load_model("platoon_bank"))[0]}
+    made["uncertain"] = design(load_model("platoon", UNCERTAIN))[0]
+    made["everything"] = design(load_model("platoon_bank", EVERYTHING))[0]
+    made["published"] = design(load_model("platoon", {"detector.threshold": "zonotope_published"}))[0]
+    return made
 
 
-NAMES = ("platoon", "tank", "places")
+NAMES = ("platoon", "tank", "places", "bank", "uncertain", "everything", "published")
 
 
 @dataclass(frozen=True)
@@ -336,11 +453,13 @@ class Built:
         return done.stdout.splitlines()
 
 
-def definitions(name: str) -> list[str]:
-    """How a probe is told the model's names."""
+def definitions(tables: Tables) -> list[str]:
+    """How a probe is told the model's names, and the length of an array that only a model with banks has."""
+    name = tables.name
     parts = {"MODEL_HEADER": f'"{name}.h"', "CONFIG": f"hg_{name}_config", "SENDER": f"hg_{name}_sender"}
     parts |= {"NODE": f"hg_{name}_node", "SENDERS": f"hg_{name}_senders"}
     parts |= {"START_NODE": f"hg_{name}_node_start", "START_SENDERS": f"hg_{name}_senders_start"}
+    parts["SUMS"] = "(sizeof node.sum / sizeof node.sum[0])" if tables.banks else "0U"
     return [f"-D{key}={value}" for key, value in parts.items()]
 
 
@@ -365,7 +484,7 @@ def built(request: pytest.FixtureRequest, designs: dict[str, Design], objects: d
     for program, text in (("probe", PROBE), ("report", REPORT)):
         (out / f"{program}.c").write_text(text, encoding="ascii")
         for r in REALS:
-            command = ["gcc", *WARNINGS, "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", f"-DHG_REAL_{r.upper()}=1", *definitions(name)]
+            command = ["gcc", *WARNINGS, "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", f"-DHG_REAL_{r.upper()}=1", *definitions(d.tables)]
             command += [f"-I{ROOT}/firmware/include", f"-I{out}", str(out / f"{program}.c"), str(out / f"{name}.c"), *map(str, objects[r])]
             subprocess.run([*command, "-o", str(out / f"{program}_{r}")], check=True)
     database = cantools.database.load_string((out / f"{name}.dbc").read_text(encoding="ascii"), "dbc", strict=True)
@@ -505,25 +624,68 @@ def _group(g: GroupTable) -> Numbers:
     return numbers + _each("span", tuple(s.span for s in g.signals)) + _each("middle", tuple(s.middle for s in g.signals))
 
 
+def _some(values: object, *keys: str) -> Numbers:
+    """Fields of a table, each under its own name."""
+    return [p for key in keys for p in _each(key, getattr(values, key))]
+
+
+def _matrix(tag: str, m: tuple[tuple[float, ...], ...]) -> Numbers:
+    return _each("rows", len(m)) + _each("cols", len(m[0])) + _each("exponent", 0) + _each(tag, m)
+
+
+def _generator(g: GeneratorTable) -> Numbers:
+    numbers = _each("order", len(g.state)) + _each("residuals", len(g.output)) + _each("width", len(g.signal)) + _each("signal", g.signal)
+    for key in ("state", "input", "output", "direct"):
+        numbers += _matrix(key, getattr(g, key))
+    numbers += _each("threshold", len(g.output))
+    if g.zonotope is not None:
+        return numbers + _zonotope(g.zonotope)
+    numbers += _each("wide", len(g.wide)) + _each("wide", g.wide)
+    return numbers + _some(g, "taps", "weight", "settle", "rest", "moving", "ready_rest", "ready_moving", "decay", "tail_input", "tail_output")
+
+
+def _zonotope(z: ZonotopeTable) -> Numbers:
+    numbers = _each("wide", len(z.signal)) + _each("wide", z.signal) + _some(z, "order", "columns", "reduction")
+    numbers += _each("blocks", len(z.block)) + _some(z, "block", "state", "input")
+    numbers += _each("disturbances", len(z.disturbance)) + _some(z, "disturbance") + _each("initial", len(z.rest))
+    numbers += _some(z, "rest", "moving", "output", "outer", "direct", "settle", "bias_rest", "bias_moving")
+    return numbers + _some(z, "decay", "always", "growth", "output_growth", "recover", "ready_rest", "ready_moving")
+
+
+def _predictor(p: PredictTable) -> Numbers:
+    numbers = _some(p, "group", "first") + _each("order", len(p.state)) + _each("width", len(p.output)) + _each("inputs", len(p.input)) + _some(p, "input", "known")
+    for key in ("correct", "state", "drive", "output", "direct"):
+        numbers += _matrix(key, getattr(p, key))
+    return numbers + _some(p, "fresh") + _each("horizon", len(p.radius)) + _some(p, "radius", "settle")
+
+
+def _bank(b: BankTable) -> Numbers:
+    numbers = _some(b, "certificates", "window") + _each("width", len(b.signal)) + _some(b, "signal", "weight", "bias", "widen")
+    return numbers + _each("extras", len(b.extra)) + _some(b, "extra") + _each("extra_weight", b.extra_weight if b.extra else ())
+
+
+def _uncertain(m: MismatchTable | None) -> Numbers:
+    if m is None:
+        return _each("uncertain", 0)
+    return _each("uncertain", 1) + _each("states", len(m.constant)) + _each("width", len(m.signal)) + _some(m, "signal", "constant", "gain")
+
+
 def expected_numbers(d: Design) -> Numbers:
     """What the probe has to print, from the tables."""
     t = d.tables
-    numbers = _each("signals", t.signals) + _each("groups", len(t.groups))
+    numbers = _each("signals", t.signals) + _each("all_signals", t.width) + _each("groups", len(t.groups))
     for g in t.groups:
         numbers += _group(g)
-    numbers += _each("generators", len(t.generators))
-    for e in t.generators:
-        numbers += _each("order", len(e.state)) + _each("residuals", len(e.output)) + _each("width", len(e.signal)) + _each("signal", e.signal)
-        for key in ("state", "input", "output", "direct"):
-            m = getattr(e, key)
-            numbers += _each("rows", len(m)) + _each("cols", len(m[0])) + _each("exponent", 0) + _each(key, m)
-        numbers += _each("same", 1)
-        for key in ("taps", "weight", "settle", "rest", "moving", "ready_rest", "ready_moving", "decay", "tail_input", "tail_output"):
-            numbers += _each(key, getattr(e, key))
-    numbers += _each("decisions", len(t.generators))
-    numbers += _each("feeds", tuple(e.feeds for e in t.generators)) + _each("faults", tuple(e.faults for e in t.generators))
-    numbers += _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("all_residuals", t.residuals)
+    numbers += _each("generators", len(t.generators)) + _each("either", 1) + [p for g in t.generators for p in _generator(g)]
+    numbers += _each("predictors", len(t.predictors)) + [p for x in t.predictors for p in _predictor(x)] + _uncertain(t.mismatch)
+    numbers += _each("banks", len(t.banks)) + [p for b in t.banks for p in _bank(b)]
+    judging = (*t.generators, *t.banks)
+    numbers += _each("decisions", len(judging)) + _each("feeds", tuple(g.feeds for g in judging)) + _each("faults", tuple(g.faults for g in judging))
+    numbers += (
+        _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("values", t.window) + _each("all_residuals", t.residuals)
+    )
     numbers += _each("codes", 2 * t.signals) + [(tag, float(t.reals)) for tag in ("reals", "needed", "stored")]
+    numbers += [(tag, float(t.sums)) for tag in ("sums", "needed", "stored")]
     numbers += _each("closing", t.closing) + _message(t.verdict, ()) + _message(t.status, ())
     return numbers + _each("heartbeat", t.heartbeat) + _each("hash", t.hash) + [("node", 1.0), ("null", 1.0), ("senders", 1.0), ("null", 1.0)]
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from host_support import REALS, SEED, SILENT_1, Cli, Models, Ready, build_library
 from hullguard.codegen import emit_c
-from hullguard.core.library import Library
+from hullguard.core.library import Library, library
 from hullguard.core.native import (
+    MOVING,
     PLANT_STATES,
     REST,
+    Batch,
     Frame,
     Native,
     Node,
@@ -21,6 +23,8 @@ from hullguard.core.native import (
     Sender,
     bus_of,
 )
+from hullguard.design.design import Design
+from hullguard.design.tables import Tables
 from hullguard.model import parse_fault
 from hullguard.plant.run import InProcess, Pace, Run, Trace
 
@@ -68,47 +72,51 @@ def test_batches_and_traces_of_one_run_agree(models: Models, real: str) -> None:
 
 # ---- generated tables ----
 
-ACCESS = """
-#include "platoon.h"
-const hg_node_config   *test_config(void);
-const hg_sender_config *test_senders(void);
-const hg_node_config   *test_config(void) { return &hg_platoon_config; }
-const hg_sender_config *test_senders(void) { return hg_platoon_sender; }
-"""
+UNCERTAIN = {"plant.drag_per_s": {"value": 1.0, "pm": 0.1}, "detector.prediction": True}
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "plain": ("platoon", {}),
+    "bank": ("platoon_bank", {}),
+    "uncertain": ("platoon", UNCERTAIN),
+    "zonotope": ("platoon", UNCERTAIN | {"detector.threshold": "zonotope"}),
+    "published": ("platoon", {"detector.threshold": "zonotope_published"}),
+    "everything": ("platoon_bank", UNCERTAIN | {"detector.threshold": "zonotope"}),
+}
+
+
+class Generated(Native):
+    """A model whose node and senders are those of its generated C; only what the emulator needs is filled at run time."""
+
+    def __init__(self, lib: Library, made: Design) -> None:
+        super().__init__(lib, made.tables)
+        # cffi takes a const structure of a library for a number.
+        lib.ffi.cdef(f"extern hg_node_config hg_{made.tables.name}_config; extern hg_sender_config hg_{made.tables.name}_sender[];")
+        self.node, self.senders = lib.ffi.addressof(lib.lib, f"hg_{made.tables.name}_config"), getattr(lib.lib, f"hg_{made.tables.name}_sender")
 
 
 @pytest.fixture(scope="module", params=REALS)
-def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, models: Models) -> tuple[Ready, Library]:
-    """The platoon's generated C compiled into a library of its own, beside the structures that Python fills."""
-    folder: Path = tmp_path_factory.mktemp(f"generated_{request.param}")
-    ready = models.platoon("manoeuvres", None, request.param)
-    header, source = emit_c(ready.design)
-    (folder / "include").mkdir()
-    (folder / "include" / "platoon.h").write_text(header, encoding="ascii")
-    lib = build_library(folder / "lib", request.param, extra=source + ACCESS, includes=("-I", str(folder / "include")))
-    lib.ffi.cdef("const hg_node_config *test_config(void); const hg_sender_config *test_senders(void);")
-    return ready, lib
-
-
-def generated_node(ready: Ready, lib: Library, start: int) -> Node:
-    native: Any = SimpleNamespace(library=lib, node=lib.lib.test_config(), tables=ready.native.tables)
-    return Node(native, start)
-
-
-def generated_senders(ready: Ready, lib: Library) -> Sender:
-    native: Any = SimpleNamespace(library=lib, senders=lib.lib.test_senders(), tables=ready.native.tables)
-    return Sender(native)
+def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, models: Models) -> dict[str, tuple[Ready, Generated]]:
+    """Every variant's generated C compiled into one library, each under a name of its own, beside the structures that Python fills."""
+    designs: dict[str, Design] = {}
+    extra: dict[str, str] = {}
+    for name, (model, overrides) in VARIANTS.items():
+        made = models.design(overrides, "manoeuvres", model)
+        designs[name] = replace(made, tables=replace(made.tables, name=f"model_{name}"))
+        extra[f"model_{name}.h"], extra[f"model_{name}.c"] = emit_c(designs[name])
+    lib = build_library(tmp_path_factory.mktemp(f"generated_{request.param}") / "lib", request.param, extra=extra)
+    scenario = designs["plain"].model.scenario("manoeuvres")
+    return {n: (Ready(d, Native(library(request.param), d.tables), scenario.reference, scenario.samples), Generated(lib, d)) for n, d in designs.items()}
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(generated: tuple[Ready, Library], lockstep: bool, loss: float) -> None:
-    ready, lib = generated
+@pytest.mark.parametrize("name", ["plain", "everything"])
+def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(generated: dict[str, tuple[Ready, Generated]], name: str, lockstep: bool, loss: float) -> None:
+    ready, compiled = generated[name]
     rng = np.random.default_rng(SEED)
     for start in (REST, 0):
         source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in FAULTS], SEED)
-        nodes = (Node(ready.native, start), generated_node(ready, lib, start))
-        senders = (Sender(ready.native), generated_senders(ready, lib))
+        nodes = (Node(ready.native, start), Node(compiled, start))
+        senders = (Sender(ready.native), Sender(compiled))
         answers = 0
         for k in range(200):
             reading = source.read()
@@ -134,6 +142,54 @@ def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(
             source.move()
         assert answers > 20
         assert nodes[0].health() == nodes[1].health()
+
+
+def assert_same(one: Batch, other: Batch, runs: int) -> None:
+    """Rows and traces of some runs equal to the bit."""
+    assert one.runs(0, runs) == other.runs(0, runs)
+    for run in range(runs):
+        traces = one.trace(run), other.trace(run)
+        for part in traces[0]:
+            assert traces[0][part].tobytes() == traces[1][part].tobytes(), f"run {run}: {part}"
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize(("loss", "burst", "start"), [(0.0, 0, REST), (0.1, 3, REST), (0.3, 5, MOVING)])
+def test_runs_with_generated_tables_differ_in_no_bit(generated: dict[str, tuple[Ready, Generated]], name: str, loss: float, burst: int, start: int) -> None:
+    ready, compiled = generated[name]
+    faults = [parse_fault(f) for f in FAULTS]
+    options: dict[str, Any] = {"loss": loss, "burst": burst, "start": start}
+    filled, tables = (Batch(n, ready.design, 160, ready.reference, faults, SEED, **options) for n in (ready.native, compiled))
+    rows = filled.runs(0, 5)
+    assert any(r["plant"] > 1 or r["provisional_at"] >= 0 for r in rows) and (loss == 0.0 or sum(r["lost"] for r in rows) > 0)
+    assert_same(filled, tables, 5)
+
+
+def nudged(tables: Tables) -> list[Tables]:
+    """Tables with one number of one part by a unit in its last place larger."""
+
+    def larger(row: tuple[float, ...]) -> tuple[float, ...]:
+        return (float(np.nextafter(np.float32(row[0]), np.float32(np.inf))), *row[1:])
+
+    bank, predictor, g, m = tables.banks[0], tables.predictors[0], tables.generators[0], tables.mismatch
+    assert m is not None and g.zonotope is not None
+    z = replace(g.zonotope, output_growth=larger(g.zonotope.output_growth))
+    return [
+        replace(tables, banks=(replace(bank, bias=tuple(larger((b,))[0] for b in bank.bias)), *tables.banks[1:])),
+        replace(tables, predictors=(replace(predictor, state=(larger(predictor.state[0]), *predictor.state[1:])),)),
+        replace(tables, generators=(replace(g, zonotope=z),)),
+        replace(tables, mismatch=replace(m, constant=larger(m.constant))),
+    ]
+
+
+def test_one_number_of_any_part_makes_a_difference(generated: dict[str, tuple[Ready, Generated]]) -> None:
+    ready, compiled = generated["everything"]
+    batch = Batch(compiled, ready.design, 160, ready.reference, (), SEED)
+    for i, tables in enumerate(nudged(ready.design.tables)):
+        other = Batch(Native(ready.native.library, tables), ready.design, 160, ready.reference, (), SEED)
+        with pytest.raises(AssertionError):
+            assert_same(batch, other, 5)
+        assert batch.runs(0, 1) == Batch(ready.native, ready.design, 160, ready.reference, (), SEED).runs(0, 1), i
 
 
 def test_the_committed_tables_are_those_of_the_design(models: Models) -> None:

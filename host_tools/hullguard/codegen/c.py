@@ -70,6 +70,13 @@ def comment(text: str) -> list[str]:
     return ["/* " + ("\n * ".join(lines)) + " */"]
 
 
+def entries(line: str, indent: int) -> list[str]:
+    """A line of an initialiser, or several where it is long, what continues it set `indent` columns in; an entry stays whole."""
+    tied = line.replace(" = ", "\0=\0")
+    lines = textwrap.wrap(tied, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
+    return [part.replace("\0=\0", " = ") for part in lines]
+
+
 def fill(items: Sequence[str]) -> list[str]:
     """Items of one row with commas; a row that does not fit on a line is spread evenly over several, what continues it set further in."""
     fits = (WIDTH - 8) // (max(len(i) for i in items) + 2)
@@ -340,7 +347,7 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     order, width, residuals = len(g.state), len(g.signal), len(g.output)
     lines = [f"/* ---- Residual generator {n.removeprefix('generator')} ---- */", ""]
     lines += table("uint8_t", f"{n}_signal", f"{width}", [unsigned(g.signal)], "places of the signals it reads: " + ", ".join(signals[i] for i in g.signal))
-    if g.wide != g.signal:
+    if g.zonotope is None and g.wide != g.signal:  # a zonotope has its own
         about = "places of the radii that its threshold adds up: " + ", ".join(signals[i] for i in g.wide)
         lines += table("uint8_t", f"{n}_wide", f"{len(g.wide)}", [unsigned(g.wide)], about)
     for part, cols, about in (("state", order, "next state from state"), ("input", width, "next state from signals")):
@@ -512,7 +519,8 @@ def _zonotopes(tables: Tables) -> list[str]:
         lines += [
             f"    {{.order = {z.order}U, .residuals = {len(z.output)}U, .width = {len(z.signal)}U, .disturbances = {len(z.disturbance)}U,",
             f"     .initial = {len(z.rest)}U, .columns = {z.columns}U, .blocks = {len(z.block)}U, .reduction = {REDUCTIONS[z.reduction]},",
-            f"     .signal = {n}_wide, .block = {n}_block, .state = {n}_lam, .input = {tied['input']}, .disturbance = {tied['disturbance']},",
+            f"     .signal = {n}_wide, .block = {n}_block, .state = {n}_lam,",
+            f"     .input = {tied['input']}, .disturbance = {tied['disturbance']},",
             f"     .rest = {tied['rest']}, .moving = {tied['moving']}, .output = {tied['output']}, .outer = {tied['outer']},",
             f"     .direct = {tied['direct']}, .settle = {z.settle}U, .bias_rest = {tied['bias_rest']}, .bias_moving = {tied['bias_moving']},",
             f"     .decay = {n}_decay, .always = {n}_always, .growth = {n}_growth, .output_growth = {n}_output_growth,",
@@ -581,7 +589,7 @@ def _starts(tables: Tables) -> list[str]:
         "        return HG_E_ARGUMENT;",
         "    }",
         "    const hg_node_memory memory = {",
-        f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},",
+        *entries(f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},", 21),
         f"                     .alarm = self->alarm, .code = self->code, .codes = {2 * tables.signals}U, .real = self->real, .reals = {tables.reals}UL,",
         f"                     .sum = {own[5]}, .sums = {tables.sums}UL}},",
         "        .link = self->link,",
