@@ -353,4 +353,47 @@ std::uint32_t Decision::candidates() const
     return common;
 }
 
+/* ---- Banks ---- */
+
+void Bank::step(const Vector &value, const Vector &radius)
+{
+    value_.push_back(value);
+    radius_.push_back(radius);
+    ++since_;
+}
+
+bool Bank::ready() const
+{
+    return since_ >= certificates_.front().weight.rows();
+}
+
+double Bank::residual(size_t certificate) const
+{
+    const Matrix &w = certificates_[certificate].weight;
+    double        r = 0.0;
+    for (Eigen::Index lag = 0; lag < w.rows(); ++lag) { r += w.row(lag).dot(value_[value_.size() - 1U - static_cast<size_t>(lag)]); }
+    return r;
+}
+
+double Bank::moved(size_t certificate) const
+{
+    const Matrix &w = certificates_[certificate].weight;
+    double        sum = 0.0;
+    for (Eigen::Index lag = 0; lag < w.rows(); ++lag) {
+        sum += w.row(lag).cwiseAbs().dot(value_[value_.size() - 1U - static_cast<size_t>(lag)].cwiseAbs());
+    }
+    return sum;
+}
+
+double Bank::threshold(size_t certificate) const
+{
+    const Certificate &c = certificates_[certificate];
+    double             J = c.bias;
+    for (Eigen::Index lag = 0; lag < c.weight.rows(); ++lag) {
+        const Vector &radius = radius_[radius_.size() - 1U - static_cast<size_t>(lag)];
+        J += widen_ * c.weight.row(lag).cwiseAbs().dot(radius.head(c.weight.cols())) + c.extra.row(lag).dot(radius);
+    }
+    return J;
+}
+
 } // namespace oracle

@@ -173,6 +173,35 @@ private:
     std::vector<Matrix> y_, u_, d_, x_; /* [lag] */
 };
 
+/* ---- Banks of certificates (platoon, section 7; bank.h) ---- */
+
+/** A parity vector over the last samples, the newest first, and over whole rows: 0 where a signal is not read. */
+struct Certificate {
+    Matrix weight; /* [window][values] */
+    Matrix extra;  /* [window][radii] >= 0, of radii that stand for no value */
+    double bias = 0.0;
+};
+
+/** r and J of every certificate from everything that was ever held. */
+class Bank {
+public:
+    Bank(const std::vector<Certificate> &certificates, double widen) : certificates_(certificates), widen_(widen) {}
+    void    step(const Vector &value, const Vector &radius);
+    void    reset() { since_ = 0; }
+    bool    ready() const;
+    Vector &radius(long lag) { return radius_[radius_.size() - 1U - static_cast<std::size_t>(lag)]; } /* may turn out to have been another */
+    long    samples() const { return static_cast<long>(radius_.size()); }
+    double  residual(std::size_t certificate) const;
+    double  threshold(std::size_t certificate) const;
+    double  moved(std::size_t certificate) const; /* sum of |weight value|: what rounding of r is a share of */
+
+private:
+    const std::vector<Certificate> &certificates_;
+    double                          widen_;
+    std::vector<Vector>             value_, radius_; /* [sample] */
+    long                            since_ = 0;
+};
+
 /* ---- The decision (platoon, section 4, "Confirmation"; decision.h) ---- */
 
 enum class State { starting = 0, none = 1, provisional = 2, confirmed = 3 };

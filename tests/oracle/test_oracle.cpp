@@ -21,6 +21,7 @@
 extern "C" {
 #include <cmocka.h>
 
+#include "hullguard/bank.h"
 #include "hullguard/decision.h"
 #include "hullguard/detector.h"
 #include "hullguard/hold.h"
@@ -1488,6 +1489,136 @@ std::string Chain::run()
     return failure;
 }
 
+/* ---- e) A bank of certificates over rings whose past is rewritten ---- */
+
+struct BankTables {
+    std::vector<oracle::Certificate> certificates;
+    std::vector<std::uint8_t>        signal, extra;
+    Reals                            weight, extra_weight, bias;
+    hg_bank_config                   config{};
+    int                              values, radii;
+
+    explicit BankTables(Random &random)
+    {
+        const int window = random.whole(1, 40), count = random.whole(1, 20), width = random.whole(1, 6), extras = random.whole(0, 3);
+        values = width + random.whole(0, 3);
+        radii  = values + extras + random.whole(0, 2);
+        signal = random_places(random, width, values);
+        if (extras > 0) { extra = random_places(random, extras, radii - values); }
+        for (std::uint8_t &e : extra) { e = static_cast<std::uint8_t>(e + values); } /* derived signals come behind the sent ones */
+        const double widen = static_cast<double>(round_up(random.chance(0.5) ? 1.0 : random.real(1.0, 1.5)));
+        for (int c = 0; c < count; ++c) {
+            certificates.push_back({Matrix::Zero(window, values), Matrix::Zero(window, radii), static_cast<double>(nearest(random.real(1e-3, 1.0)))});
+            bias.push_back(nearest(certificates.back().bias));
+        }
+        for (int lag = 0; lag < window; ++lag) {
+            fill(random, lag, signal, weight, [](oracle::Certificate &c) -> Matrix & { return c.weight; }, -1.0);
+            fill(random, lag, extra, extra_weight, [](oracle::Certificate &c) -> Matrix & { return c.extra; }, 0.0);
+        }
+        config = {static_cast<std::uint8_t>(count), static_cast<std::uint8_t>(window), static_cast<std::uint8_t>(width), signal.data(), weight.data(),
+                  static_cast<std::uint8_t>(extras), extra.data(), extra_weight.data(), bias.data(), nearest(widen)};
+    }
+
+private:
+    template <class Part> void fill(Random &random, int lag, const std::vector<std::uint8_t> &places, Reals &table, Part part, double least)
+    {
+        for (const std::uint8_t place : places) {
+            for (oracle::Certificate &c : certificates) {
+                const hg_real w = nearest(random.chance(0.2) ? 0.0 : random.real(least, 1.0));
+                part(c)(lag, place) = static_cast<double>(w);
+                table.push_back(w);
+            }
+        }
+    }
+};
+
+struct BankCount {
+    int alarms = 0, quiet = 0, empty = 0;
+};
+
+/* What the library says of one sample, held against every certificate. */
+std::string judge_bank(const hg_bank &self, const oracle::Bank &bank, const BankTables &tables, double r, double J, BankCount &count)
+{
+    const double share = unit * (static_cast<double>(tables.config.window) * (tables.config.width + tables.config.extras + 1.0) + 8.0);
+    const double own_r = bank.residual(self.closest), own_J = bank.threshold(self.closest);
+    if (!(std::abs(r - own_r) <= share * bank.moved(self.closest))) { return say("certificate %d: r %.17g, oracle %.17g", self.closest, r, own_r); }
+    if (!(std::abs(J - own_J) <= share * own_J)) { return say("certificate %d: J %.17g, oracle %.17g", self.closest, J, own_J); }
+    const bool alarm = std::abs(r) > J;
+    (alarm ? count.alarms : count.quiet)++;
+    for (size_t c = 0; c < tables.certificates.size(); ++c) {
+        const double other = std::abs(bank.residual(c)), limit = bank.threshold(c), slack = share * (bank.moved(c) + limit);
+        if (!alarm && other > limit + slack) { return say("certificate %zu alarms, |r| %.17g > %.17g, the bank does not", c, other, limit); }
+        if (alarm != (other > limit) && std::abs(other - limit) > slack) { continue; } /* the nearest is an alarm where there is one */
+        if (other / limit > (std::abs(own_r) / own_J) * (1.0 + share) + 2.0 * slack / limit + 2.0 * share * bank.moved(self.closest) / own_J) {
+            return say("certificate %zu has |r| / J %.17g, the bank chose %d with %.17g", c, other / limit, self.closest, std::abs(own_r) / own_J);
+        }
+    }
+    return {};
+}
+
+std::string one_bank(Random &random, BankCount &count)
+{
+    const BankTables    tables(random);
+    const int           length = tables.config.window + random.whole(0, 5);
+    Reals               value_memory(static_cast<size_t>(tables.values * length)), radius_memory(static_cast<size_t>(tables.radii * length));
+    std::vector<hg_acc> sums(HG_BANK_SUMS(tables.config.certificates));
+    hg_ring             value{}, radius{};
+    hg_bank             self{};
+    const auto          values = static_cast<std::uint8_t>(tables.values), radii = static_cast<std::uint8_t>(tables.radii), rows = static_cast<std::uint8_t>(length);
+    if (!hg_bank_valid(&tables.config, values, radii, rows) || hg_ring_start(&value, values, rows, value_memory.data()) != HG_OK ||
+        hg_ring_start(&radius, radii, rows, radius_memory.data()) != HG_OK || hg_bank_start(&self, &tables.config, sums.data()) != HG_OK) {
+        return "start refused";
+    }
+    oracle::Bank     bank(tables.certificates, static_cast<double>(tables.config.widen));
+    const double     size = random.real(0.1, 4.0);
+    std::vector<int> mode(static_cast<size_t>(tables.radii), 1);
+    Reals            v(static_cast<size_t>(tables.values)), w(static_cast<size_t>(tables.radii));
+    for (int k = 0; k < 120; ++k) {
+        if (random.chance(0.01)) {
+            hg_bank_reset(&self);
+            bank.reset();
+        }
+        for (hg_real &x : v) { x = nearest(size * random.real(-1.0, 1.0)); }
+        random_radii(random, w, mode);
+        if (hg_ring_push(&value, v.data()) != HG_OK || hg_ring_push(&radius, w.data()) != HG_OK) { return "push refused"; }
+        Vector held(tables.values), wide(tables.radii);
+        for (Eigen::Index i = 0; i < held.size(); ++i) { held(i) = static_cast<double>(v[static_cast<size_t>(i)]); }
+        for (Eigen::Index i = 0; i < wide.size(); ++i) { wide(i) = static_cast<double>(w[static_cast<size_t>(i)]); }
+        bank.step(held, wide);
+        for (int lag = 1; random.chance(0.05) && lag < length && lag < bank.samples(); ++lag) { /* the past turns out to be worse than thought */
+            const int     place = random.whole(0, tables.radii - 1);
+            const hg_real wider = nearest(random.real(0.0, 5.0));
+            hg_ring_rewrite(&radius, static_cast<std::uint8_t>(lag), static_cast<std::uint8_t>(place), 1U, &wider);
+            bank.radius(lag)(place) = static_cast<double>(wider);
+        }
+        hg_real         r = nearest(9.0), J = nearest(9.0);
+        const hg_status status = hg_bank_step(&self, &value, &radius, &r, &J);
+        if (hg_bank_ready(&self) != bank.ready() || (status == HG_OK) != bank.ready()) { return say("k %d: status %d, oracle ready %d", k, static_cast<int>(status), bank.ready()); }
+        if (!bank.ready()) {
+            ++count.empty;
+            if (status != HG_E_EMPTY || std::abs(static_cast<double>(r)) > 0.0 || J != tables.bias[0]) { return say("k %d: output before the window is full", k); }
+            continue;
+        }
+        const std::string wrong = judge_bank(self, bank, tables, static_cast<double>(r), static_cast<double>(J), count);
+        if (!wrong.empty()) { return say("k %d: ", k) + wrong; }
+    }
+    return {};
+}
+
+void test_bank(void **)
+{
+    Random      random = stream(8);
+    BankCount   count;
+    std::string failure;
+    for (int i = 0; i < problems / 5 && failure.empty(); ++i) {
+        failure = one_bank(random, count);
+        if (!failure.empty()) { failure = say("bank %d: ", i) + failure; }
+    }
+    std::printf("bank: %d alarms, %d samples without, %d with a window that is not full\n", count.alarms, count.quiet, count.empty);
+    if (failure.empty() && std::min({count.alarms, count.quiet, count.empty}) < problems) { failure = "too few cases of a kind"; }
+    expect_clean(failure);
+}
+
 void test_detector(void **)
 {
     Random      random = stream(7);
@@ -1513,7 +1644,7 @@ int main()
     const CMUnitTest tests[] = {
         cmocka_unit_test(test_residual), cmocka_unit_test(test_hull),  cmocka_unit_test(test_oracle_itself),
         cmocka_unit_test(test_trigger),  cmocka_unit_test(test_hold), cmocka_unit_test(test_decision),
-        cmocka_unit_test(test_detector),
+        cmocka_unit_test(test_detector), cmocka_unit_test(test_bank),
     };
     return cmocka_run_group_tests_name("oracle", tests, nullptr, nullptr);
 }
