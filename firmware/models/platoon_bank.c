@@ -3435,7 +3435,8 @@ hg_status hg_platoon_bank_node_start(hg_platoon_bank_node *self, hg_start how)
         return HG_E_ARGUMENT;
     }
     const hg_node_memory memory = {
-        .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = self->bank,
+        .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL,
+                     .bank = self->bank,
                      .alarm = self->alarm, .code = self->code, .codes = 12U, .real = self->real, .reals = 518UL,
                      .sum = self->sum, .sums = 104UL},
         .link = self->link,

@@ -225,7 +225,10 @@ def test_the_design_report_shows_banks_isolability_and_cost(made: Design, facts:
     pairs = isolability(made.model, 30, (2, 4))
     write_design_report(made, tmp_path / "d.html", pairs)
     text, _ = check_html(tmp_path / "d.html")
-    for expected in ("Banks of certificates", "a bank of 16 certificates, 6 banks for isolation", "not gap12_sensor", "2160 runs", "Cost on the ECU", "never"):
+    wish = made.model.detector.bank
+    assert wish is not None
+    runs = wish.runs * len(wish.sizes) * len(wish.faults) * 2 * 2  # both signs, at rest and under manoeuvres
+    for expected in ("Banks of certificates", "a bank of 16 certificates, 6 banks for isolation", "not gap12_sensor", f"{runs} runs", "Cost on the ECU", "never"):
         assert expected in text
     assert "gap23_sensor from controller3: whatever gap23_sensor does" in text
     assert f"{facts[0].smallest[1, 0]:.3g}" in text

@@ -16,6 +16,7 @@ from cantools.database.can import Database, Message
 from hullguard.codegen import emit_c, emit_dbc, write_all
 from hullguard.codegen.c import fill, real
 from hullguard.codegen.dbc import short
+from hullguard.codegen.names import LIBRARY
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design, design
 from hullguard.design.tables import (
@@ -34,7 +35,7 @@ from hullguard.design.tables import (
 )
 from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError
-from hullguard.model.schema import load_model
+from hullguard.model.schema import SHIPPED, load_model
 
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = ROOT / "firmware" / "models"
@@ -515,11 +516,20 @@ def test_text_is_plain_and_says_where_it_comes_from(designs: dict[str, Design], 
         assert not re.search(r"[ \t]$", text, re.MULTILINE)
 
 
-def test_shipped_files_are_those_of_the_shipped_model(designs: dict[str, Design]) -> None:
-    header, source = emit_c(designs["platoon"])
-    assert (MODELS / "platoon.h").read_text(encoding="ascii") == header
-    assert (MODELS / "platoon.c").read_text(encoding="ascii") == source
-    assert (MODELS / "platoon.dbc").read_text(encoding="ascii") == emit_dbc(designs["platoon"])
+@pytest.mark.parametrize("name", sorted(p.stem for p in SHIPPED.glob("*.toml") if not p.stem.endswith(".design")))
+def test_shipped_files_are_those_of_the_shipped_models(name: str) -> None:
+    made = design(load_model(name))[0]
+    header, source = emit_c(made)
+    assert (MODELS / f"{name}.h").read_text(encoding="ascii") == header
+    assert (MODELS / f"{name}.c").read_text(encoding="ascii") == source
+    assert (MODELS / f"{name}.dbc").read_text(encoding="ascii") == emit_dbc(made)
+
+
+def test_a_model_called_like_a_header_of_the_library_is_refused(designs: dict[str, Design]) -> None:
+    assert {p.stem for p in (ROOT / "firmware" / "include" / "hullguard").glob("*.h")} == LIBRARY
+    d = designs["tank"]
+    with pytest.raises(InputError, match=r"zonotope\.h.*rename"):
+        emit_c(replace(d, tables=replace(d.tables, name="zonotope")))
 
 
 def test_files_are_written_only_when_they_change(designs: dict[str, Design], tmp_path: Path) -> None:

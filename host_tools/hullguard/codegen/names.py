@@ -72,6 +72,12 @@ def unit_of(name: str) -> str:
     return UNITS.get(suffix, "") if suffix != name else ""
 
 
+# The library's own headers: hg_NAME_config and NAME.h of a model that is called like one would be declared twice.
+LIBRARY = frozenset(
+    "bank can code config decision detector e2e frame hold hull hullguard linalg mismatch node predict real residual ring status trigger zonotope".split()
+)
+
+
 @dataclass(frozen=True)
 class Names:
     """Identifiers of groups, signals (in vector order) and faults."""
@@ -84,6 +90,8 @@ class Names:
 def names_of(design: Design) -> Names:
     """The identifiers of a design."""
     tables = design.tables
+    if tables.name in LIBRARY:
+        raise InputError(f"model name '{tables.name}': the library has a header {tables.name}.h of its own, and generated files would clash with it; rename the model")
     own = (tables.verdict.name, tables.status.name)
     for g in tables.groups:
         if identifier(g.name).lower() in own:
