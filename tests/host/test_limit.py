@@ -198,3 +198,20 @@ def test_feedback_that_the_plant_does_not_have_cannot_be_known(cli: Cli) -> None
     refused = cli("limit", "openacc", "--set", "detector.feedback_known=1", "--runs", 1)
     assert refused.status == 2
     assert "feedback_known" in refused.err
+
+
+def test_no_plant_of_the_intervals_is_beyond_explanation(models: Models) -> None:
+    """What an uncertain plant may do is part of the explanation; without it healthy plants would have none."""
+    ready = models.platoon("manoeuvres", {"plant.drag_per_s": {"value": 1.0, "pm": 0.3}}, "f64")
+    design = ready.design
+    scale = usual_scale(design.model)
+    programme, certain = Explanation(design.model, 30, scale, design.varying), Explanation(design.model, 30, scale)
+    batch, wrong = ready.batch(100), 0
+    for run in range(8):
+        trace = batch.trace(run)
+        for k in range(29, 100, 10):
+            assert not programme.unexplained(trace, k)
+            wrong += certain.unexplained(trace, k)
+    assert wrong > 0
+    found = [first_unexplained(programme, ready.batch(160, ("controller2:bias:3.0@100",)).trace(run), 100, 160) for run in range(5)]
+    assert all(f is not None for f in found)

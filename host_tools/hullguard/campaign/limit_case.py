@@ -17,7 +17,7 @@ def limit_of(case: Case, runs: int) -> float | None:
     if case.fault_start is None or case.fault_start < WINDOW or case.loss > 0.0:
         return None
     batch, design = configured(case)
-    programme = Explanation(design.model, WINDOW, usual_scale(design.model))
+    programme = Explanation(design.model, WINDOW, usual_scale(design.model), design.varying)
     delays = [first_unexplained(programme, batch.trace(run), case.fault_start, case.samples) for run in range(min(runs, RUNS))]
     known = [d for d in delays if d is not None]
     return float(np.mean(known)) if known else None

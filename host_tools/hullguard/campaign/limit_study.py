@@ -62,8 +62,9 @@ class _Examiner:
         self.job, self.emulator = job, Emulator(job.model, job.stored, job.real)
         model = self.emulator.design.model
         scale = usual_scale(model)
-        self.programme = Explanation(model, job.window, scale)
-        self.knowing = Explanation(model, job.window, scale, feedback=True) if model.detector.feedback_known else None
+        varying = self.emulator.design.varying
+        self.programme = Explanation(model, job.window, scale, varying)
+        self.knowing = Explanation(model, job.window, scale, varying, feedback=True) if model.detector.feedback_known else None
 
     def delays(self, point: Point, run: int) -> dict[str, int | None]:
         """Of the limit and of every detector in one run."""

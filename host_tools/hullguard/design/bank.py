@@ -20,7 +20,7 @@ from hullguard.campaign.tasks import Emulator, Tick, each
 from hullguard.design.bank_table import full_weight, stored_weight
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.design import Design, usual_radius
-from hullguard.design.limit import EXPLAINED, Explanation, first_unexplained
+from hullguard.design.limit import Explanation, first_unexplained
 from hullguard.design.store import Stored
 from hullguard.design.window import WindowForm, fault_response, window_form
 from hullguard.errors import InputError
@@ -118,7 +118,7 @@ class _Trainer:
         self.emulator = Emulator(job.model, job.stored)
         model = self.emulator.design.model
         self.model = model
-        self.programme = Explanation(model, job.spec.window, usual_scale(model))
+        self.programme = Explanation(model, job.spec.window, usual_scale(model), self.emulator.design.varying)
         self.free = None if job.spec.hypothesis is None else model.faults[job.spec.hypothesis]
 
     def work(self, task: tuple[int, Case]) -> _Found:
@@ -142,8 +142,7 @@ class _Trainer:
     def _duals(self, trace: dict[str, Array], limit: int) -> list[Array]:
         duals = [self.programme.certificate()]
         for k in range(limit + 1, min(limit + self.spec.later, len(trace["value"]))):
-            past = slice(k - self.spec.window + 1, k + 1)
-            if self.programme.relaxation(trace["value"][past], trace["radius"][past], self.free) > EXPLAINED:
+            if self.programme.unexplained(trace, k, self.free):
                 duals.append(self.programme.certificate())
         return duals
 

@@ -21,7 +21,7 @@ from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
-from hullguard.design.window import Varying
+from hullguard.design.window import Varying, varying_states
 from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.detector import PUBLISHED
@@ -63,6 +63,12 @@ class Design:
     checks: tuple[Check, ...]
     load_bound: float
     usual: Array  # radii of the whole vector most of the time
+    uncertain: tuple[int, ...]  # states whose mismatch is a derived signal, the last ones of the vector
+
+    @property
+    def varying(self) -> Varying:
+        """Disturbances whose bounds are the radii of the uncertain states."""
+        return varying_states(self.model.plant, self.uncertain)
 
     @property
     def judges(self) -> list[str]:
@@ -261,7 +267,7 @@ def finish(model: Model, stored: Stored) -> Design:
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
-    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual)
+    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states)
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:
@@ -412,8 +418,7 @@ def used_banks(model: Model, stored: Stored) -> list[StoredBank]:
 
 
 def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, ...]:
-    states = list(derived.states)
-    varying = Varying(np.eye(model.plant.n)[:, states], np.zeros((model.plant.m, len(states))))
+    varying = varying_states(model.plant, derived.states)
     made = []
     for b in used_banks(model, stored):
         size = model.faults[b.hypothesis].size_max if b.hypothesis is not None else None

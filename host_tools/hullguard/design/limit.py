@@ -64,6 +64,7 @@ class Explanation:
         plant = model.plant
         self.model, self.window = model, window
         self._gain = plant.feedback.gain if feedback and plant.feedback is not None else None
+        self._varying = (varying or no_varying(plant)).columns
         self._errors = folded(plant, varying or no_varying(plant))
         rows = self._matrix(scale)
         self._highs: Any = highspy.Highs()  # type: ignore[no-untyped-call]
@@ -128,6 +129,12 @@ class Explanation:
         self._highs.changeColsBounds(len(self._every_column), self._every_column, np.append(-bound, 0.0), np.append(bound, math.inf))
         return self._solve()
 
+    def unexplained(self, trace: dict[str, Array], k: int, free: Fault | None = None, reference: Array | None = None) -> bool:
+        """Whether the window that ends at sample k of Batch.trace() has no explanation. Its signal vector ends with the radii of the varying disturbances."""
+        past, width = slice(k - self.window + 1, k + 1), trace["radius"].shape[1]
+        known = None if reference is None else reference[past]
+        return self.relaxation(trace["value"][past], trace["radius"][past], free, trace["radius"][past, width - self._varying :], known) > EXPLAINED
+
     def _command(self, u: Array, reference: Array | None) -> tuple[Array, Array]:
         """K x + eu as the control law gives it, and how far the wire's code and a sensor of u may be off it."""
         plant, model = self.model.plant, self.model
@@ -156,10 +163,4 @@ class Explanation:
 
 def first_unexplained(programme: Explanation, trace: dict[str, Array], start: int, last: int, free: Fault | None = None, reference: Array | None = None) -> int | None:
     """Samples from `start` to the first window that ends at it or later and has no explanation; None when there is none before `last`."""
-    N = programme.window
-    for k in range(max(start, N - 1), last):
-        past = slice(k - N + 1, k + 1)
-        known = None if reference is None else reference[past]
-        if programme.relaxation(trace["value"][past], trace["radius"][past], free, reference=known) > EXPLAINED:
-            return k - start
-    return None
+    return next((k - start for k in range(max(start, programme.window - 1), last) if programme.unexplained(trace, k, free, reference)), None)

@@ -8,6 +8,7 @@ order (arith.mul), so that tables made from a window form are the same to the by
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +43,15 @@ class WindowForm:
     Me: Array  # N m x N ne
 
 
+def varying_states(plant: Plant, states: Sequence[int]) -> Varying:
+    """What an uncertain plant adds to these states: a derived signal each."""
+    columns = list(states)
+    return Varying(np.eye(plant.n)[:, columns], np.zeros((plant.m, len(columns))))
+
+
 def no_varying(plant: Plant) -> Varying:
     """A plant whose parameters are certain."""
-    return Varying(np.zeros((plant.n, 0)), np.zeros((plant.m, 0)))
+    return varying_states(plant, ())
 
 
 def window_form(plant: Plant, window: int, varying: Varying | None = None) -> WindowForm:
