@@ -552,3 +552,27 @@ def test_a_folder_that_holds_no_campaign_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match=r"campaign\.json"):
         write_campaign_report(tmp_path)
+
+
+# ---- plants of the intervals, and the limit beside the delays ----
+
+UNCERTAIN = 'plant.drag_per_s={value=1.0,pm=0.1}'
+
+
+def test_plants_are_drawn_from_the_intervals_in_turn(cli: Cli) -> None:
+    common = ("campaign", "platoon", "--scenario", "manoeuvres", "--runs", 12, "--set", UNCERTAIN, "--json", "-q")
+    few, more = (cli(*common, "--plants", n).json["rows"] for n in (1, 12))
+    assert [r["bits"] for r in few] != [r["bits"] for r in more], "other plants send other frames"
+    assert all(r["false_provisional"] == 0 for r in few + more)
+    refused = cli("campaign", "platoon", "--runs", 1, "--plants", 3)
+    assert refused.status == 2
+    assert "no interval to draw from" in refused.err
+
+
+def test_the_limit_stands_beside_the_delay(cli: Cli) -> None:
+    found = cli("campaign", "platoon", "--scenario", "rest", "--runs", 20, "--size", "1,2", "--fault", "controller2:bias:1@100", "--limit", "--json", "-q").json["cases"]
+    for case in found:
+        assert 1.0 <= case["limit"] <= case["delay_mean"]
+    assert found[1]["limit"] < found[0]["limit"]
+    lossy = cli("campaign", "platoon", "--scenario", "rest", "--runs", 5, "--loss", "0.1", "--fault", "controller2:bias:1@100", "--limit", "--json", "-q").json["cases"]
+    assert lossy[0].get("limit") is None
