@@ -134,8 +134,9 @@ class _Trainer:
                 continue
             found.group.append(group)
             found.limit.append(limit)
-            found.value.append(trace["value"][begin:])
-            found.radius.append(trace["radius"][begin:])
+            sent = len(self.model.signals)  # certificates read nothing that is derived
+            found.value.append(trace["value"][begin:, :sent])
+            found.radius.append(trace["radius"][begin:, :sent])
             found.dual.extend(self._duals(trace, spec.start + limit))
         return found
 

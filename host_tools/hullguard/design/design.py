@@ -10,7 +10,7 @@ import numpy as np
 
 from hullguard.bus.bits import load_bound
 from hullguard.design import hull, store, zonotope
-from hullguard.design.arith import digits, mul
+from hullguard.design.arith import digits, mul, row_sums, up32
 from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
@@ -171,12 +171,12 @@ def find(model: Model, tick: Tick) -> Stored:
         plant = replace(plant, feedback=Feedback(digits(plant.feedback.gain), plant.feedback.reference_bound))
     model = replace(model, plant=plant)
     reached = reach(model, horizon)
-    model = _disturbed(model, reached.state, reached.signal)
-    radius = usual_radius(model)
-    observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
     if model.detector.isolation is not None:
         # A hypothesis must not be excluded because its fault moves the plant faster than a healthy one moves.
         reached = replace(faulty_reach(model, reached), signal=reached.signal)
+    model = _disturbed(model, reached.state, reached.signal)
+    radius = usual_radius(model)
+    observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
     spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
     return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), observers, *spread)
@@ -402,7 +402,7 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
         tail_input=tuple(float(x) for x in g.tables.tail_input),
         tail_output=tuple(float(x) for x in g.tables.tail_output),
         feeds=_feeds(model, {sent.get(i, i) for i in used}),
-        faults=sum(1 << i for i, s in enumerate(size) if s < SEEN or predicted),
+        faults=sum(1 << i for i, s in enumerate(size) if s < SEEN or predicted) | breaking(model),
         zonotope=g.zonotope,
     )
 
@@ -417,6 +417,27 @@ def used_banks(model: Model, stored: Stored) -> list[StoredBank]:
     return used
 
 
+def breaking(model: Model) -> int:
+    """Mask of the faults that can make the radii and ranges themselves too small, so that no alarm excludes them.
+
+    An actuator's fault moves the loop beyond its healthy slews, unless these account for it; and what an uncertain plant may do is
+    bounded by readings and commands, which a fault falsifies.
+    """
+    accounted = model.detector.isolation is not None
+    return sum(1 << i for i, f in enumerate(model.faults) if uncertain(model) or (f.type == "actuator" and not (accounted and f.size_max is not None)))
+
+
+def _beside(model: Model, bank: StoredBank, table: BankTable, mismatch: MismatchTable | None, size: float) -> tuple[float, ...]:
+    """The bias of a bank whose hypothesis is a fault of an uncertain plant: readings and commands bound the mismatch only to within the fault."""
+    fault = model.faults[bank.hypothesis].signal if bank.hypothesis is not None else -1
+    if mismatch is None or fault not in mismatch.signal:
+        return table.bias
+    gain = np.array(mismatch.gain)[:, mismatch.signal.index(fault)]
+    weight = np.array(table.extra_weight).transpose(2, 0, 1)  # certificates x window x states
+    more = row_sums((weight * gain).reshape(len(weight), -1)) * size
+    return tuple(float(x) for x in up32((np.array(table.bias) + more) * (1 + 1e-6)))
+
+
 def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, ...]:
     varying = varying_states(model.plant, derived.states)
     made = []
@@ -424,7 +445,9 @@ def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, .
         size = model.faults[b.hypothesis].size_max if b.hypothesis is not None else None
         table = bank_table(model, stored, b, varying, size or FAULT_SIZE)
         behind = _feeds(model, set(derived.mismatch.signal)) if derived.mismatch is not None else 0  # what the radii of uncertain states follow from
-        made.append(replace(table, extra=derived.uncertain, feeds=table.feeds | behind))
+        faults = table.faults if b.hypothesis is not None else table.faults | breaking(model)
+        bias = _beside(model, b, table, derived.mismatch, size or FAULT_SIZE)
+        made.append(replace(table, extra=derived.uncertain, feeds=table.feeds | behind, faults=faults, bias=bias))
     if len(model.observers) + len(made) > GENERATORS_MAX:
         raise InputError(f"{model.path.name}: {len(model.observers)} observers and {len(made)} banks, {GENERATORS_MAX} are possible; isolate fewer faults")
     return tuple(made)

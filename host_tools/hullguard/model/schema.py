@@ -343,7 +343,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         for n in bank.faults if bank is not None else ():
             if n not in [f.name for f in faults]:
                 raise inner.error(f"{key}.faults", f"'{n}' is not one of {', '.join(f.name for f in faults) or 'none'}")
-    observers = _read_observers(inner, outputs, inputs, faults, detector.bank is None)
+    observers = _read_observers(inner, outputs, inputs, faults)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     scenarios = _read_scenarios(top, path)
     network = top.table("network", optional=True)
@@ -563,10 +563,9 @@ def _read_fault(t: Table, signals: tuple[Signal, ...]) -> Fault:
     return Fault(name, places[0], kind, size_max)
 
 
-def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...], needed: bool) -> tuple[Observer, ...]:
-    """`needed`: there is nothing else that detects."""
+def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tuple[Fault, ...]) -> tuple[Observer, ...]:
     observers = []
-    for o in t.tables("observers", optional=not needed):
+    for o in t.tables("observers"):
         chosen = {key: o.names(key, everything) for key, everything in (("outputs", outputs), ("inputs", inputs), ("faults", [f.name for f in faults]))}
         for key, known in (("outputs", outputs), ("inputs", inputs), ("faults", [f.name for f in faults])):
             for n in chosen[key]:
@@ -590,8 +589,8 @@ def _read_observers(t: Table, outputs: list[str], inputs: list[str], faults: tup
             )
         )
         o.close()
-    if not int(needed) <= len(observers) <= GENERATORS_MAX:
-        raise t.error("observers", f"{len(observers)} residual generators; {int(needed)} .. {GENERATORS_MAX} are possible")
+    if not 1 <= len(observers) <= GENERATORS_MAX:
+        raise t.error("observers", f"{len(observers)} residual generators; 1 .. {GENERATORS_MAX} are possible")
     t.close()
     return tuple(observers)
 
