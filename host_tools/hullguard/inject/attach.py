@@ -42,8 +42,9 @@ class _Reader(threading.Thread):
 
 
 def attach(injector: Injector, near: CanLink, far: CanLink | None, stop: Callable[[], bool], sink: Sink = lambda sent: None, ready: Callable[[], None] = lambda: None) -> None:
-    """Work until `stop` says so. Without `far` a tap on `near`; with it a gateway that injects on the way from near to far and hands back what
-    comes the other way. Error frames of a bus stay on it. `sink` gets what was sent, with seconds since the start.
+    """Work until `stop` says so: without `far` as a tap on `near`, with it as a gateway that injects on the way from near to far.
+
+    What comes the other way is handed back as it is. Error frames of a bus stay on it. `sink` gets what was sent, with seconds since the start.
     """
     frames: queue.Queue[tuple[CanLink, Frame | BusError]] = queue.Queue()
     readers = [_Reader(link, frames) for link in (near, far) if link is not None]
@@ -81,13 +82,14 @@ def attach(injector: Injector, near: CanLink, far: CanLink | None, stop: Callabl
 def on_log(injector: Injector, entries: Iterable[Entry]) -> Iterator[Entry]:
     """A log as a gateway would have made it; the injector's time begins with the first entry."""
     first: Entry | None = None
-    for entry in entries:
-        first = first or entry
-        for sent in injector.take(entry.frame, max(0.0, entry.time_s - first.time_s)):
-            yield replace(first, time_s=first.time_s + sent.time_s, frame=sent.frame)
-    for sent in injector.finish():
-        if first is not None:
-            yield replace(first, time_s=first.time_s + sent.time_s, frame=sent.frame)
+    last: Entry | None = None
+    for last in entries:
+        first = first or last
+        for sent in injector.take(last.frame, max(0.0, last.time_s - first.time_s)):
+            yield replace(last, time_s=first.time_s + sent.time_s, frame=sent.frame)
+    if first is not None and last is not None:
+        for sent in injector.finish():
+            yield replace(last, time_s=first.time_s + sent.time_s, frame=sent.frame)
 
 
 def play(entries: Iterable[Entry], link: CanLink, stop: Callable[[], bool], speed: float = 1.0) -> int:
