@@ -130,9 +130,9 @@ def _pairs(text: str, where: str) -> dict[str, str]:
     return made
 
 
-def parse_directive(spec: str) -> Directive:
-    """Read a one-line SPEC; raises InputError with what would do."""
-    where = f"directive '{spec}'"
+def parse_directive(spec: str, where: str = "") -> Directive:
+    """Read a one-line SPEC; raises InputError with `where` it stands, if that is known, and what would do."""
+    where = f"{where}: directive '{spec}'" if where else f"directive '{spec}'"
     head, tail = _halves(spec.strip())
     action, colon, options = head.partition(":")
     if not re.fullmatch(r"[a-z]+", action):
@@ -176,7 +176,7 @@ def _trigger(given: Mapping[str, str], where: str) -> Trigger:
 
     made = Trigger(
         ids=tuple(_id(x.strip(), where) for x in given["id"].split("|")) if "id" in given else (),
-        when=Predicate(given["when"]) if "when" in given else None,
+        when=_condition(given["when"], where) if "when" in given else None,
         start_s=of("from", float, 0.0) or 0.0,
         end_s=math.inf if "to" not in given else of("to", float, 0.0),
         nth=of("nth", int, 1) or 0,
@@ -196,6 +196,13 @@ def _trigger(given: Mapping[str, str], where: str) -> Trigger:
         return made
     first, last = _samples(given["k"], where)
     return replace(made, k_start=first, k_end=last)
+
+
+def _condition(text: str, where: str) -> Predicate:
+    try:
+        return Predicate(text)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def _samples(text: str, where: str) -> tuple[int, int | None]:
@@ -247,7 +254,7 @@ def read_directives(path: Path) -> list[Directive]:
 def _entry(node: yaml.Node, where: str) -> Directive:
     value = _plain(node, where)
     if isinstance(value, str):
-        return replace(parse_directive(value), where=where)
+        return parse_directive(value, where)
     if not isinstance(value, dict) or not isinstance(value.get("action"), str):
         raise InputError(f"{where}: expected a one-line directive, or a mapping with action, and if need be options, trigger, name")
     for key in value.keys() - {"action", "options", "trigger", "name"}:

@@ -13,6 +13,7 @@ from hullguard.inject.codec import Codec, Field, Header, Layout
 from hullguard.inject.options import option
 
 STAMP_MODULUS = 16
+GONE = ("lost", "early", "overdue")  # what a receiver counts in consequence of a frame that it does not get or refuses; the last two, of closing frames
 COPY = "the changed frame goes out beside the original, which a tap can do, not in its place"
 
 
