@@ -1,7 +1,7 @@
 """A gateway between two channels: gap12_m is 0.5 m too large from second 2 on, in frames whose checksum is right.
 
-    python host_tools/examples/gateway_bias.py NAME.dbc INTERFACE FROM TO [SECONDS]
-    python host_tools/examples/gateway_bias.py firmware/models/platoon.dbc socketcan vcan0 vcan1
+python host_tools/examples/gateway_bias.py NAME.dbc INTERFACE FROM TO [SECONDS]
+python host_tools/examples/gateway_bias.py firmware/models/platoon.dbc socketcan vcan0 vcan1
 """
 
 import sys

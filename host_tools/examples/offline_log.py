@@ -1,9 +1,9 @@
 """A recorded log, falsified without any bus: directives of a YAML file in, another log out, and the truth beside it.
 
-    python host_tools/examples/offline_log.py NAME.dbc FAULTS.yaml IN.log OUT.log
-    hullguard run platoon --bus inprocess --no-fault --out build/healthy
-    python host_tools/examples/offline_log.py firmware/models/platoon.dbc host_tools/examples/faults.yaml build/healthy/run.log build/faulty.log
-    hullguard detect platoon --rest --log build/faulty.log
+python host_tools/examples/offline_log.py NAME.dbc FAULTS.yaml IN.log OUT.log
+hullguard run platoon --bus inprocess --no-fault --out build/healthy
+python host_tools/examples/offline_log.py firmware/models/platoon.dbc host_tools/examples/faults.yaml build/healthy/run.log build/faulty.log
+hullguard detect platoon --rest --log build/faulty.log
 """
 
 import sys

@@ -1,7 +1,7 @@
 """A tap, a second talker on one channel: a forged measurement every half second, and a flood of identifier 0 in the fourth second.
 
-    python host_tools/examples/tap_spoof.py NAME.dbc INTERFACE CHANNEL [SECONDS]
-    python host_tools/examples/tap_spoof.py firmware/models/platoon.dbc socketcan vcan0
+python host_tools/examples/tap_spoof.py NAME.dbc INTERFACE CHANNEL [SECONDS]
+python host_tools/examples/tap_spoof.py firmware/models/platoon.dbc socketcan vcan0
 """
 
 import sys

@@ -55,7 +55,7 @@ class _Stage:
             about = self.action.prepare(codec)
             named = [(codec.message(i.text) if i.id is None else None, i) for i in t.ids]
             for name in t.when.names if t.when else ():
-                codec.signal(name)
+                self.traffic.watched[name] = codec.signal(name)
         except InputError as error:
             raise InputError(f"{d.where}: {error}") from error
         if t.k_start is not None and codec.closing is None:

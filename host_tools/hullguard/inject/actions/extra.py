@@ -106,7 +106,7 @@ class Spoof(Action):
             stamp = shot.traffic.stamp if self.stamp is None else self.stamp
             data = layout.protection.protect(data, self._count(shot, layout) % layout.protection.modulus, stamp)
             data = data if self.valid else layout.damaged(data)
-        return Frame(layout.id, layout.flags, data)
+        return Frame(layout.id, layout.flags if last is None else last.flags, data)
 
     def _count(self, shot: Shot, layout: Layout) -> int:
         """The counter behind the sender's last one and this one's own since."""
