@@ -132,7 +132,7 @@ class Field:
     def _code(self, raw: int) -> int:
         return raw - (1 << self.length) if self.is_signed and raw >> (self.length - 1) else raw
 
-    @property
+    @cached_property
     def codes(self) -> tuple[int, int]:
         """Least and largest code, of the DBC's range as far as the field goes."""
         ones = (1 << (self.length - self.is_signed)) - 1
