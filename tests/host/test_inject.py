@@ -288,6 +288,16 @@ def test_one_more_directive_moves_no_others_chances(seed: int, more: list[str]) 
         assert [r.sent for r in together.ledger.rows if r.directive == "mine"] == [r.sent for r in alone.ledger.rows]
 
 
+def test_a_directive_may_have_a_seed_of_its_own() -> None:
+    runs = []
+    for seed in (3, 4):
+        inject = injector("corrupt:bits=2@p=0.5,seed=18446744073709551615", "noise:signal=gap12_m,size=1", seed=seed)
+        through(inject, stream(20))
+        runs.append([r for r in inject.ledger.rows if r.action == "corrupt"])
+        assert {r.seed for r in inject.ledger.rows} == {seed, 2**64 - 1}
+    assert runs[0] == runs[1]
+
+
 def test_another_seed_gives_others() -> None:
     runs = {tuple(s.frame.data for s in through(injector(*RANDOM[:2], seed=seed), stream(20))) for seed in range(20)}
     assert len(runs) == 20

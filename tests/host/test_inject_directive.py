@@ -53,6 +53,7 @@ BAD = {
     "drop@k=5..5": "not after its start",
     "drop@k=-1": "START..END",
     "drop@id=0x20000000": "largest",
+    "drop@seed=-1": "at least 0",
     "drop@id=a-b": "neither a message's name nor a number",
     "flood@at=1,period=1": "one of them",
     "flood@at=1,nth=2": "one or the other",

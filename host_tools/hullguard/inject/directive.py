@@ -1,16 +1,6 @@
 """Directives: which frames or moments (trigger), and what then happens (action). One line, or an entry of a YAML file.
 
-ACTION[:OPTION=VALUE,..][@TRIGGER=VALUE,..]        bias:signal=gap12_m,size=0.5@id=measurement,from=10,to=20
-
-trigger  id=ID[|ID..]     messages by name or number, a number with /MASK or x for extended (0x110, 0x100/0x7F0, 0x110x, measurement)
-         when="CONDITION" on the signals last seen: gap12_m > 1.0 and speed1_mps < 3
-         from=T, to=T     seconds since the start; time>=T and time<T say the same
-         k=K[..K]         sample indices, where the closing message is known; the end is not part of it
-         nth=N, every=N   the N-th of the frames that all of the above leave, or each N-th
-         at=T, period=T   not a frame but a moment, or one every T seconds from `from` to `to`
-         p=P              with probability P
-         count=N          at most N times
-         name=NAME        name in the ledger, and of the directive's own random numbers
+How both are written stands in arguments.SPEC, which --help prints. An entry has action, options, trigger and name, or is a one-line directive.
 """
 
 from __future__ import annotations
@@ -32,7 +22,8 @@ _TIME = re.compile(r"^time\s*(>=|>|<=|<)\s*(.+)$")
 _SAMPLES = re.compile(r"^(\d+)(\.\.(\d+)?)?$")
 _ID = re.compile(r"^(0[xX][0-9A-Fa-f]+|\d+)(?:/(0[xX][0-9A-Fa-f]+|\d+))?(x)?$")
 _SIGN = {">=": "from", ">": "from", "<": "to", "<=": "to"}
-TRIGGERS = ("id", "when", "from", "to", "k", "nth", "every", "at", "period", "p", "count", "name")
+TRIGGERS = ("id", "when", "from", "to", "k", "nth", "every", "at", "period", "p", "count", "name", "seed")
+SEED_MAX = 2**64 - 1
 STANDARD_MAX, EXTENDED_MAX = 0x7FF, 0x1FFFFFFF
 
 
@@ -82,6 +73,7 @@ class Directive:
     action: str
     options: Mapping[str, str] = field(default_factory=dict)
     trigger: Trigger = field(default_factory=Trigger)
+    seed: int | None = None  # instead of the injector's
     spec: str = ""
     where: str = ""
 
@@ -151,7 +143,8 @@ def _made(action: str, options: Mapping[str, str], trigger: Mapping[str, str], s
     if action not in ACTIONS:
         raise InputError(f"{where}: no action '{action}'; there are {', '.join(sorted(ACTIONS))}")
     fill(ACTIONS[action], options, where)
-    return Directive(trigger.get("name", ""), action, dict(options), _trigger(trigger, where), spec, where)
+    seed = int(number(trigger["seed"], int, 0, SEED_MAX, f"{where}: seed={trigger['seed']}")) if "seed" in trigger else None
+    return Directive(trigger.get("name", ""), action, dict(options), _trigger(trigger, where), seed, spec, where)
 
 
 def _id(text: str, where: str) -> IdMatch:
