@@ -152,6 +152,8 @@ def test_times_and_order() -> None:
     assert [round(s.time_s, 3) for s in late] == [0.0, 0.01, 0.11, 0.2, 0.21, 0.25, 0.3, 0.31] and late[5].frame == measurement(1)
     swapped = through(injector("reorder@id=measurement|control,nth=3"), frames)
     assert [s.frame for s in swapped[:5]] == [measurement(0), control(0), control(1), measurement(1), measurement(2)]
+    twofold = through(injector("reorder:behind=2@id=measurement|control,nth=3"), frames)
+    assert [s.frame for s in twofold[:5]] == [measurement(0), control(0), control(1), measurement(2), measurement(1)]
     patient = through(injector("reorder:behind=9,patience=0.05@id=measurement,nth=1"), frames)
     assert patient[1] == Sent(0.05, measurement(0)) and len(patient) == len(frames)
     twice = through(injector("duplicate:gap=0.005@id=control,nth=1"), frames)
@@ -286,6 +288,14 @@ def test_one_more_directive_moves_no_others_chances(seed: int, more: list[str]) 
         together = injector(*specs, seed=seed)
         through(together, stream(30))
         assert [r.sent for r in together.ledger.rows if r.directive == "mine"] == [r.sent for r in alone.ledger.rows]
+
+
+def test_directives_have_chances_of_their_own() -> None:
+    inject = injector("noise:signal=gap12_m,size=1", "noise:signal=gap23_m,size=1")
+    through(inject, stream(5))
+    details = [[r.detail.split("-> ")[1] for r in inject.ledger.rows if r.directive == f"noise{i}"] for i in (1, 2)]
+    moved = [[round(float(d) - was, 3) for d, was in zip(details[0], (0.1 * k for k in range(5)), strict=True)], [round(float(d) - 2.0, 3) for d in details[1]]]
+    assert moved[0] != moved[1]
 
 
 def test_a_directive_may_have_a_seed_of_its_own() -> None:

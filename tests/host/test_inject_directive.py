@@ -9,6 +9,8 @@ from host_support import ROOT
 from hullguard.errors import InputError
 from hullguard.inject import parse_directive, read_codec, read_directives
 from hullguard.inject.predicate import Predicate
+from hypothesis import given
+from hypothesis import strategies as st
 from inject_support import DBC, codec, injector
 
 GOOD = [
@@ -75,6 +77,7 @@ UNKNOWN = {
     "spoof:set=gap12_m=1": "needs message=",
     "spoof:frame=123,message=control": "leave message=",
     "spoof:frame=XYZ": "candump",
+    "flood:rate=1e5,lasts=100": "period=",
     "drop@at=5": "from=, nth= or count=",
     "spoof@at=5": "from=, nth= or count=",
     "rtr@period=1": "from=, nth= or count=",
@@ -125,6 +128,25 @@ def test_conditions() -> None:
     }.items():  # fmt: skip
         assert Predicate(text).holds(values) is expected, text
     assert not Predicate("a > 1").holds({"a": float("nan")})
+
+
+PIECES = ["drop", "bias", "spoof", ":", "@", "=", ",", "signal", "gap12_m", "size", "id", "when", "'", '"', "(", ">", "1", "-", "0x110", "/", "|", ";", "..", "k", "p", " ", "nan", "1e999", "9" * 400]
+
+
+@given(st.one_of(st.text(max_size=40), st.lists(st.sampled_from(PIECES), max_size=14).map("".join)))
+def test_whatever_is_written_is_read_or_refused(text: str) -> None:
+    try:
+        injector(text)
+    except InputError as error:
+        assert "\n" not in str(error).replace(text, "")
+
+
+def test_a_deep_condition_is_refused_or_works() -> None:
+    for text in ("(" * 5000 + "a > 1" + ")" * 5000, "not " * 5000 + "a > 1", "a > " + "-" * 5000 + "1"):
+        with pytest.raises(InputError, match="more than 400"):
+            Predicate(text)
+    assert Predicate("not " * 98 + "a > 1").holds({"a": 2.0}) and Predicate("a > " + "-" * 390 + "1").holds({"a": 2.0})
+    assert not Predicate("(" * 150 + "a > 1" + ")" * 150).holds({"a": 0.0})
 
 
 # ---- YAML ----

@@ -13,6 +13,7 @@ from hullguard.inject.codec import Codec, Field, Header, Layout
 from hullguard.inject.options import option
 from hullguard.inject.shot import COPY, GONE, Action, Change, Shot, assignments
 
+FLOOD_MAX = 1_000_000
 HISTORY = 4096  # frames that replay can look back on
 CLASSIC_MAX, STANDARD_MAX, EXTENDED_MAX = 8, 0x7FF, 0x1FFFFFFF
 
@@ -191,6 +192,12 @@ class Flood(Action):
     def at_moments(self) -> bool:
         """It needs no frame."""
         return True
+
+    def prepare(self, codec: Codec) -> tuple[Layout, ...]:
+        """All frames of a flood are made at once."""
+        if self.rate * self.lasts > FLOOD_MAX:
+            raise InputError(f"{self.rate * self.lasts:.0f} frames at once are more than {FLOOD_MAX}; take a shorter flood and repeat it with period=")
+        return ()
 
     def fire(self, shot: Shot) -> Frame | None:
         """All of them, one after another."""
