@@ -25,8 +25,8 @@ GATEWAY = ("--from-interface", "socketcan", "--from-channel", "vcan0", "--to-int
 TAP = ("-i", "socketcan", "-c", "vcan0", "--fd")
 
 
-def inject(*options: object) -> contextlib.AbstractContextManager[Process]:
-    return process(*hullguard("inject", DBC, "--ready", "--json", "-q", *options))
+def inject(names: object, *options: object) -> contextlib.AbstractContextManager[Process]:
+    return process(*hullguard("inject", names, "--ready", "--json", "-q", *options))
 
 
 def told(process_: Process) -> dict:
@@ -41,14 +41,14 @@ def labels(folder: Path) -> list[dict[str, str]]:
 def test_a_gateway_before_a_node(tmp_path: Path) -> None:
     """Plant on vcan0, node on vcan1; the node counts what the ledger says and finds the wrong value; its verdicts come back through."""
     drive = Drive(scenario="rest")
-    faults = ("--do", "bias:signal=gap12_m,size=2@name=wrong", "--do", "corrupt:bits=3@id=measurement,every=4")
+    faults = ("--do", "bias:signal=gap12_m,size=3@k=50", "--do", "corrupt:bits=3@id=measurement,every=4")
     with (
         link("vcan0") as plant,
         node("--interface", "vcan1", "--lockstep", "--rest", "--status") as n,
-        inject(*GATEWAY, *faults, "--out", tmp_path) as gate,
+        inject("platoon", *GATEWAY, *faults, "--out", tmp_path) as gate,
     ):
         verdicts = []
-        for _ in range(60):
+        for _ in range(80):
             frames, tick = drive.sample()
             for f in [*frames, tick]:
                 plant.send(f)
@@ -61,7 +61,8 @@ def test_a_gateway_before_a_node(tmp_path: Path) -> None:
     measured = health(n)["measurement"]
     sent = [e.frame for e in candump.read(tmp_path / "injected.log")]
     assert measured["good"] + crc == sum(f.id == 0x110 for f in sent) and len(sent) == result["sent"]
-    assert any(v.plant == "confirmed" for v in verdicts), "through the checksum the wrong gap gets, but not past the physics"
+    alarmed = [v.k for v in verdicts if v.plant == "confirmed"]
+    assert alarmed and min(alarmed) >= 50 and min(int(r["k"]) for r in rows if r["action"] == "bias") >= 50, "past the checksum, not past the physics"
 
 
 class Raw:
@@ -90,7 +91,7 @@ def test_a_tap_with_all_that_only_socketcan_carries(tmp_path: Path) -> None:
     long = Frame(0x321, FD, bytes(range(16)))
     specs = ("fdtwin@id=0x110,nth=5", "exttwin@id=0x110,nth=4", "rtr@id=0x110,nth=3", "error:kind=passive,tx=200@id=0x110,nth=2", "length:to=13,copy=true@id=0x321")
     raw = Raw()
-    with link() as bus, inject(*TAP, *(x for s in specs for x in ("--do", s)), "--out", tmp_path) as tap:
+    with link() as bus, inject(DBC, *TAP, *(x for s in specs for x in ("--do", s)), "--out", tmp_path) as tap:
         got = []
         for frame in (*frames, long):
             bus.send(frame)
