@@ -300,7 +300,7 @@ def _attributes(design: Design, made: Sequence[Message]) -> list[str]:
             f'BA_ "VFrameFormat" BO_ {m.id} {format_};',
             f'BA_ "CANFD_BRS" BO_ {m.id} {1 if m.table.flags & BRS else 0};',
             f'BA_ "E2EProfile" BO_ {m.id} {PROTECTIONS.index("P22")};',
-            f'BA_ "E2EDataIdList" BO_ {m.id} {quoted(" ".join(f"{i:02X}" for i in m.table.data_id))};',
+            f'BA_ "E2EDataIdList" BO_ {m.id} {quoted(" ".join(f"{i:02X}" for i in m.table.protection.data_ids))};',
         ]
     return lines
 

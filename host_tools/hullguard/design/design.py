@@ -274,8 +274,9 @@ def _unique_ids(model: Model, tables: Tables) -> None:
     messages = [g.message for g in tables.groups] + [tables.verdict, tables.status]
     for a in messages:
         for b in messages:
-            if a is not b and a.data_id == b.data_id:
-                raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{a.data_id[0]:02X}; give one another data_id")
+            if a is not b and a.protection.data_ids and a.protection.data_ids == b.protection.data_ids:
+                byte = a.protection.data_ids[0]
+                raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{byte:02X}; give one another data_id")
 
 
 def _disturbed(model: Model, state: Array, signal: Array) -> Model:

@@ -12,7 +12,7 @@ import numpy as np
 
 from hullguard.design.arith import U32, nearest32, up32
 from hullguard.design.bank_types import BankTable
-from hullguard.design.ids import data_ids
+from hullguard.design.protection import ProtectionTable, own_protection
 from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.schema import Frame, Group, Model, Signal
@@ -54,7 +54,7 @@ class MessageTable:
     id: int
     flags: int
     length: int
-    data_id: tuple[int, ...]
+    protection: ProtectionTable
 
 
 @dataclass(frozen=True)
@@ -265,7 +265,7 @@ def message_table(name: str, frame: Frame, length: int) -> MessageTable:
     if fd:
         length = next(n for n in FD_LENGTHS if n >= max(length, CLASSIC_MAX))
     flags = (EXTENDED if frame.extended else 0) | ((FD | BRS) if fd else 0)
-    return MessageTable(name, frame.id, flags, length, data_ids(frame.data_id))
+    return MessageTable(name, frame.id, flags, length, own_protection("P22", "both", frame.data_id)[0])
 
 
 def verdict_table(model: Model) -> MessageTable:
