@@ -11,7 +11,7 @@
 #define FINAL_H2F 0xFFU
 #define START_CCITT 0xFFFFU
 
-const hg_e2e_limits hg_e2e_limits_default = {.init = {.window = 8U, .ok = 1U, .error = 0U},
+const hg_e2e_limits hg_e2e_limits_default = {.init = {.window = 8U, .ok = 1U, .error = 2U},
                                              .valid = {.window = 8U, .ok = 1U, .error = 3U},
                                              .invalid = {.window = 8U, .ok = 2U, .error = 2U},
                                              .clear = false};
