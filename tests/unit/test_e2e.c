@@ -998,6 +998,7 @@ static void the_default_limits_do_what_they_say(void **state)
     feed(&self, l, HG_OK, 1U, HG_E2E_VALID);
     hg_e2e_machine_start(&self);
     feed(&self, l, HG_E_SEQUENCE, 20U, HG_E2E_INIT); /* a frame came, none was good */
+    feed(&self, l, HG_E_CRC, 2U, HG_E2E_INIT);
     feed(&self, l, HG_E_CRC, 1U, HG_E2E_INVALID);
     hg_e2e_limits forgetful = *l;
     forgetful.clear = true;

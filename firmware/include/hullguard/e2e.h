@@ -94,7 +94,7 @@ typedef struct {               /* flash: one a message */
 } hg_e2e_config;
 
 /** Limits for those who have no reason for others: windows of 8; INIT 1 good and at most 2 damaged frames; VALID at least 1 good and at most 3 damaged
- *  ones; INVALID is left with 2 good and at most 2 damaged ones. */
+ *  ones; INVALID is left with 2 good and at most 2 damaged ones. The order of AUTOSAR's constr_3177 (errors VALID >= INIT >= INVALID) holds. */
 extern const hg_e2e_limits hg_e2e_limits_default;
 
 /** Do all places lie in a frame of that length, apart from one another, and are tables and limits there? */
