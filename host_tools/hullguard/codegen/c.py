@@ -196,7 +196,7 @@ def _kind(g: GroupTable, closes: bool) -> str:
     """When a group's frame is sent."""
     if closes:
         return "closes the sample"
-    return "event" if g.interval_max > 1 else "periodic"
+    return "periodic" if g.periodic else "event"
 
 
 def _header(design: Design, names: Names) -> str:
