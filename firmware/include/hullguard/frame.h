@@ -25,6 +25,7 @@
 
 #include "hullguard/can.h"
 #include "hullguard/code.h"
+#include "hullguard/e2e.h"
 #include "hullguard/status.h"
 
 #include <stdbool.h>
@@ -47,12 +48,12 @@ typedef struct {                   /* flash: one a message */
     uint8_t              width;    /* signals, 0 .. HG_GROUP_SIGNALS_MAX */
     const hg_field      *field;    /* [width] */
     const hg_code_scale *scale;    /* [width] */
-    const uint8_t       *data_id;  /* [HG_E2E_IDS] */
+    const hg_e2e_config *e2e;      /* protection; the fields stay clear of its places */
 } hg_message;
 
-/** Do all fields lie inside the frame behind the protection's header, can an integer field hold every code of its scale beside the invalid
- *  pattern, and is the length one that the format can carry? Fields that overlap one another are not looked for.
- *  Cost: a pass over the fields. */
+/** Do all fields lie inside the frame and clear of the protection, is the protection valid, can an integer field hold every code of its scale
+ *  beside the invalid pattern, and is the length one that the format can carry? Fields that overlap one another are not looked for.
+ *  Cost: a pass over the fields' bits. */
 bool hg_frame_valid(const hg_message *message);
 
 /** Has a frame the message's identifier, kind (extended, remote, FD, error) and length? The bit-rate switch is not looked at. */

@@ -59,11 +59,6 @@ class MessageTable:
     protection: ProtectionTable
     idle: tuple[int, ...] = ()  # the frame's bytes where no field lies; () where they are 0
 
-    @property
-    def data_id(self) -> tuple[int, ...]:
-        """The list of profile 22."""
-        return self.protection.data_ids or (0,) * 16
-
 
 @dataclass(frozen=True)
 class GroupTable:
