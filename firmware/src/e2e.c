@@ -313,19 +313,21 @@ hg_status hg_e2e_sequence(const hg_e2e_config *config, hg_e2e_receiver *self, co
     if (hg_e2e_repeated(config, self, header)) {
         return HG_E_REPEATED;
     }
-    const uint16_t modulus = hg_e2e_modulus(config);
-    uint16_t moved = self->seen ? (uint16_t)(((header->counter + modulus) - self->counter) % modulus) : 1U;
-    moved = (moved == 0U) ? modulus : moved;
-    const bool jumped = moved > step;
-    const bool settling = (self->resync > 0U) && (moved == 1U);
-    if (jumped || ((self->resync > 0U) && (!settling))) {
+    const uint32_t modulus = hg_e2e_modulus(config);
+    uint32_t moved = 1U;
+    if (self->seen) {
+        moved = ((header->counter + modulus) - self->counter) % modulus;
+        moved = (moved == 0U) ? modulus : moved;
+    }
+    const bool jumped = (moved > step) || ((self->resync > 0U) && (moved != 1U));
+    const bool refused = jumped || (self->resync > 0U);
+    if (jumped) {
         self->resync = config->resync;
-    } else if (settling) {
+    } else if (refused) {
         self->resync--;
     } else {
         *progress = (hg_e2e_progress){.lost = (uint8_t)(moved - 1U), .continues = self->seen && (moved == 1U)};
     }
-    const bool refused = jumped || settling || (self->resync > 0U);
     self->counter = header->counter;
     self->crc = header->crc;
     self->seen = true;
@@ -350,7 +352,7 @@ static uint8_t ones(uint16_t bits)
 
 static void keep(hg_e2e_machine *self, uint8_t window)
 {
-    const uint16_t mask = (uint16_t)((1UL << window) - 1UL);
+    const uint16_t mask = (uint16_t)(((uint32_t)1U << window) - 1U);
     self->ok &= mask;
     self->error &= mask;
 }
@@ -360,13 +362,13 @@ static bool enough(const hg_e2e_machine *self, const hg_e2e_limit *limit)
     return (ones(self->ok) >= limit->ok) && (ones(self->error) <= limit->error);
 }
 
-static void fall(hg_e2e_machine *self, const hg_e2e_limits *limits)
+static void distrust(hg_e2e_machine *self, const hg_e2e_limits *limits)
 {
     self->state = HG_E2E_INVALID;
     keep(self, limits->clear ? 0U : limits->invalid.window);
 }
 
-static void rise(hg_e2e_machine *self, const hg_e2e_limits *limits)
+static void trust(hg_e2e_machine *self, const hg_e2e_limits *limits)
 {
     self->state = HG_E2E_VALID;
     keep(self, limits->valid.window);
@@ -387,9 +389,9 @@ hg_e2e_state hg_e2e_machine_step(hg_e2e_machine *self, const hg_e2e_limits *limi
     case HG_E2E_INIT:
         keep(self, limits->init.window);
         if (enough(self, &limits->init)) {
-            rise(self, limits);
+            trust(self, limits);
         } else if (ones(self->error) > limits->init.error) {
-            fall(self, limits);
+            distrust(self, limits);
         } else {
             /* not enough seen yet */
         }
@@ -397,13 +399,13 @@ hg_e2e_state hg_e2e_machine_step(hg_e2e_machine *self, const hg_e2e_limits *limi
     case HG_E2E_VALID:
         keep(self, limits->valid.window);
         if (!enough(self, &limits->valid)) {
-            fall(self, limits);
+            distrust(self, limits);
         }
         break;
     case HG_E2E_INVALID:
         keep(self, limits->invalid.window);
         if (enough(self, &limits->invalid)) {
-            rise(self, limits);
+            trust(self, limits);
         }
         break;
     case HG_E2E_DEINIT:

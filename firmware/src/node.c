@@ -44,7 +44,7 @@ static bool own_header(const hg_e2e_config *e2e)
 }
 
 /* A closing frame is the clock: without a counter a lost one would never show. */
-static bool counted(const hg_e2e_config *e2e)
+static bool has_counter(const hg_e2e_config *e2e)
 {
     return (e2e->profile != HG_E2E_NONE) && ((e2e->ignore & HG_E2E_IGNORE_COUNTER) == 0U);
 }
@@ -67,7 +67,7 @@ static bool config_valid(const hg_node_config *config)
         valid = hg_frame_valid(&config->message[i]) && (config->detector->hold[i].trigger != NULL) &&
                 (config->message[i].width == config->detector->hold[i].trigger->width);
     }
-    return valid && counted(config->message[config->closing].e2e);
+    return valid && has_counter(config->message[config->closing].e2e);
 }
 
 hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_node_memory *memory, hg_start how)
@@ -158,7 +158,7 @@ static uint16_t step_max(const hg_node *self, uint8_t group, uint32_t k)
 
 /* Sample and sequence of a measurement frame whose checksum is good. One of another sample moves the counter only where it fits the sequence:
  * a late frame has been received, an old one that is sent once more has nothing to say. */
-static hg_status place(hg_node *self, uint8_t group, const hg_e2e_header *header, hg_e2e_progress *progress)
+static hg_status admit_sample(hg_node *self, uint8_t group, const hg_e2e_header *header, hg_e2e_progress *progress)
 {
     const hg_e2e_config *e2e = self->config->message[group].e2e;
     hg_link *link = &self->link[group];
@@ -333,7 +333,7 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
     hg_link *link = &self->link[group];
     hg_status status = admit(self, group, frame, &header);
     if ((status == HG_OK) && (!closing)) {
-        status = place(self, group, &header, &progress);
+        status = admit_sample(self, group, &header, &progress);
     }
     if (status != HG_E_FORMAT) { /* a twin of another kind or length says nothing of the frames that its sender sends */
         (void)hg_e2e_machine_step(&link->machine, e2e->limits, status);
