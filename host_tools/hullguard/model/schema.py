@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hullguard.design.protection import MODAL, MODES, NIBBLE_ID_MAX, NONE, PROFILES, own_protection
+from hullguard.design.protection import MODAL, MODES, NIBBLE_ID_MAX, NONE, PROFILES
 from hullguard.errors import InputError
 from hullguard.model.choice import read_orders, read_parity, read_poles
 from hullguard.model.detector import DetectorSpec, read_detector
@@ -30,7 +30,6 @@ GROUPS_MAX = 8
 GENERATORS_MAX = 32
 FAULTS_MAX = 32
 GROUP_SIGNALS_MAX = 32
-DETECTOR_BIT = 16  # where the content of the detector's own frames begins
 
 
 @dataclass(frozen=True)
@@ -494,6 +493,7 @@ def _read_groups(top: Table, declared: list[Signal], path: Path, network: Networ
         if ids.count(key) > 1:
             raise InputError(f"{path.name}: two groups send with identifier 0x{g.frame.id:X}; give each its own")
     closing = [g for g in groups if g.closing]
+    _check_stamps(path, groups)
     for g in groups:
         # Behind the closing frame a frame without a stamp is booked to the next sample, which its skew covers.
         if closing and not g.closing and (g.frame.stamped or g.skew == 0) and _priority(g.frame) > _priority(closing[0].frame):
@@ -501,6 +501,17 @@ def _read_groups(top: Table, declared: list[Signal], path: Path, network: Networ
                 f"{path.name}: group '{g.name}' (0x{g.frame.id:X}) would arrive after the closing frame (0x{closing[0].frame.id:X}): give the closing frame the larger identifier"
             )
     return tuple(groups), order
+
+
+def _check_stamps(path: Path, groups: list[Group]) -> None:
+    """Refuse stamps that nothing tells the detector how to read: a closing frame without one counts samples by itself."""
+    blind = [g.name for g in groups if g.closing and not g.frame.stamped]
+    stamped = [g.name for g in groups if g.frame.stamped]
+    if blind and stamped:
+        raise InputError(
+            f"{path.name}: the closing frame of group '{blind[0]}' has no stamp, so nothing says what the stamps of '{stamped[0]}' count from; "
+            'name a free signal of 4 bits, protection = { .., stamp = ".." }, or close the sample with a tick of its own'
+        )
 
 
 def _priority(frame: Frame) -> tuple[int, bool, int]:
@@ -542,7 +553,7 @@ def _read_group(t: Table, places: tuple[int, ...], members: list[Signal], wire: 
         margin = t.whole("margin", 0, 64, 4)
         empty = np.zeros((1, width))
         trigger = Trigger(empty, empty, (period - 1,), period, empty, margin)
-    skew = t.whole("skew_samples", 0, 16, 0 if frame.stamped else 1)
+    skew = t.whole("skew_samples", 0, 16, 0 if frame.stamped or transmission == "tick" else 1)
     group = Group(_name(t, "verdict", "status"), places, frame, trigger, transmission == "tick", applied, skew)
     _check_stamp(t, group)
     t.close()
@@ -569,11 +580,8 @@ def _check_stamp(t: Table, group: Group) -> None:
     if not periodic and not group.frame.protected:
         cure = 'protect it, or make it transmission = "periodic"'
         raise InputError(f"{t.where}: an event-triggered frame without protection: without a counter a lost frame looks like silence, which is a promise; {cure}")
-    if group.closing and not group.frame.stamped:
-        cure = 'name a free signal of 4 bits, protection = { .., stamp = ".." }, or close the sample with a tick of its own'
-        raise InputError(f"{t.where}: the closing frame has no stamp, so it does not say which sample it closes; {cure}")
     if group.closing and group.skew:
-        raise t.error("skew_samples", "the closing frame says which sample it closes: its values are of that sample; remove it")
+        raise t.error("skew_samples", "the closing frame says which sample is which: its values are of the one it closes; remove it")
     if not periodic and group.skew:
         # A promise begins with the sender's sample, which the receiver would have to know.
         raise t.error("skew_samples", "an event-triggered sender must sample with the tick: give skew_samples = 0 if it does, or send periodically")
@@ -687,11 +695,10 @@ def _read_search(s: Table) -> Search:
 
 
 def _detector_frame(t: Table) -> Frame:
-    """A frame of the detector's, whose content begins at byte 2."""
+    """A frame of the detector's own."""
     frame = read_frame(t, int(t.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
-    if frame.profile is not None and own_protection(frame.profile, frame.mode, frame.data_id)[1] != DETECTOR_BIT:
-        mode = " in mode nibble" if frame.mode == "nibble" else ""
-        raise t.error("protection", f"the content of this frame begins at byte 2, which {frame.profile}{mode} does not leave free; choose P22")
+    if frame.profile not in (None, "P22"):
+        raise t.error("protection", f"the detector's own frames have a layout of profile 22, not {frame.profile}; remove it")
     return frame
 
 
