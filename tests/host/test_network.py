@@ -520,6 +520,7 @@ WRONG_MODEL: list[tuple[str, Any, str]] = [
     ("groups.1.transmission", "event", "'trigger' is missing"),
     ("groups.1.period_samples", 2, "sent every 100 ms by the database, 2 x 100 ms by the model"),
     ("sample_time_s", 0.03, "by the database"),
+    ("sample_time_s", 0.0005, "more than 190"),
     ("groups.1.skew_samples", 17, "outside"),
     ("groups.0.skew_samples", 1, "must sample with the tick"),
     ("groups.4.skew_samples", 1, "the one it closes"),

@@ -158,6 +158,29 @@ static void an_unprotected_event_is_never_whole(void **state)
     }
 }
 
+static void a_closing_frame_without_a_stamp_counts_samples_by_its_counter(void **state)
+{
+    (void)state;
+    rig r;
+    begin(&r, &unstamped_rule, &sm_trigger_a);
+    r.message[1].e2e = &unstamped_rule;
+    for (uint32_t k = 0U; k < 40U; k++) {
+        if ((k % 5U) != 4U) { /* every fifth is lost: the next one makes two steps */
+            assert_status(HG_OK, give(&r, 1U, 0U, 0, 0));
+            assert_status(HG_OK, hg_node_step(&r.self, &r.verdict));
+            if (((k % 5U) == 0U) && (k > 0U)) {
+                assert_int_equal(k - 1U, r.verdict.k);
+                assert_status(HG_OK, hg_node_step(&r.self, &r.verdict));
+            }
+            assert_int_equal(k, r.verdict.k);
+            assert_status(HG_E_EMPTY, hg_node_step(&r.self, &r.verdict));
+        } else {
+            r.counter[1] = (uint8_t)((r.counter[1] + 1U) % 15U);
+        }
+    }
+    assert_int_equal(7, hg_node_health(&r.self, 1U)->lost);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -166,6 +189,7 @@ int main(void)
         cmocka_unit_test(a_second_frame_within_a_sample_is_lost_for_the_promise),
         cmocka_unit_test(an_unprotected_link_is_judged_by_its_age),
         cmocka_unit_test(an_unprotected_event_is_never_whole),
+        cmocka_unit_test(a_closing_frame_without_a_stamp_counts_samples_by_its_counter),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

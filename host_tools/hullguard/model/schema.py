@@ -30,6 +30,7 @@ GROUPS_MAX = 8
 GENERATORS_MAX = 32
 FAULTS_MAX = 32
 GROUP_SIGNALS_MAX = 32
+PERIOD_MAX = 190  # samples; with the widest margin, what a receiver's age can count
 
 
 @dataclass(frozen=True)
@@ -565,7 +566,9 @@ def _read_period(t: Table, wire: Wire | None, closing: bool, sample_time_s: floa
     sample_ms = 1000 * sample_time_s
     stated = wire.cycle_ms if wire is not None else 0
     usual = max(1, round(stated / sample_ms))
-    period = 1 if closing else t.whole("period_samples", 1, 200, usual)
+    period = 1 if closing else t.whole("period_samples", 1, PERIOD_MAX, usual)
+    if period > PERIOD_MAX:
+        raise InputError(f"{t.where}: its period of {period} samples is more than {PERIOD_MAX}; choose a longer sample time")
     if wire is not None and stated and abs(stated - period * sample_ms) > max(0.5, 1e-6 * stated):
         cure = "give the model that sample time" if closing else "choose period_samples, or a sample time that divides the cycle"
         raise InputError(f"{t.where}: message '{wire.message}' is sent every {stated} ms by the database, {period} x {sample_ms:g} ms by the model; {cure}")
