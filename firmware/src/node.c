@@ -54,6 +54,16 @@ static bool stamped(const hg_e2e_config *e2e)
     return (e2e->stamp != HG_E2E_NO_STAMP) && ((e2e->ignore & HG_E2E_IGNORE_STAMP) == 0U);
 }
 
+/* Does a sender speak every interval_max samples, whatever its signals do? Its silence promises nothing, and its age tells of every loss. */
+static bool periodic(const hg_trigger_config *trigger)
+{
+    bool always = true;
+    for (uint8_t l = 0U; l < trigger->levels; l++) {
+        always = always && ((trigger->silence[l] + 1U) >= trigger->interval_max);
+    }
+    return always;
+}
+
 static bool config_valid(const hg_node_config *config)
 {
     bool valid = (config->detector != NULL) && (config->message != NULL) && (config->verdict != NULL) && (config->status != NULL) &&
@@ -309,9 +319,13 @@ static hg_status book(hg_node *self, uint8_t group, const hg_can_frame *frame, c
         if (group == self->config->closing) {
             status = close_sample(self, code, header);
         } else {
-            status = hg_detector_receive(&self->detector, group, code, progress->continues);
+            const bool uncounted = (message->e2e->profile == HG_E2E_NONE) && periodic(self->config->detector->hold[group].trigger);
+            status = hg_detector_receive(&self->detector, group, code, progress->continues || uncounted);
             if (status == HG_OK) {
                 count_good(&self->link[group].health, code, message->width);
+            } else {
+                /* A second good frame for one sample is no duplicate by its counter: what it said is lost, and the next frame continues it. */
+                (void)hg_detector_lose(&self->detector, group);
             }
         }
     }

@@ -92,6 +92,8 @@ class Native:
         m.id, m.flags, m.length, m.width = table.id, table.flags, table.length, len(signals)
         m.e2e, kept = protection(self.library, table.protection)
         self._keep += kept
+        if table.idle:
+            m.idle = self._ints("uint8_t", table.idle)
         if g is None:
             return
         fields, scales = self._new("hg_field[]", len(signals) or 1), self._new("hg_code_scale[]", len(signals) or 1)
