@@ -1,0 +1,78 @@
+"""From a bus or a log into the monitor, with a beat between frames at which others may look."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+
+import can
+
+from hullguard.bus import candump
+from hullguard.bus.overflow import OverflowLink
+from hullguard.core.native import Frame
+from hullguard.monitor.state import Monitor
+from hullguard.plant.detect import from_bus, from_log
+
+BEAT_S = 0.1  # at most between two beats of a log that is played slowly
+
+Beat = Callable[[float], bool]  # given the present on the clock of the stamps, before what comes then; True: stop
+
+
+class _Tap(OverflowLink):
+    """Hands on what concerns the detector; the monitor notes everything."""
+
+    def __init__(self, bus: can.BusABC, monitor: Monitor) -> None:
+        super().__init__(bus)
+        self._monitor = monitor
+        self._behind_s: float | None = None  # from this host's monotonic clock to the stamps'
+
+    def receive(self, timeout_s: float) -> tuple[Frame, float] | None:
+        """None too for a frame that does not concern the detector, so that a flood of those does not keep its deadline from being looked at."""
+        got = super().receive(timeout_s)
+        if got is None:
+            return None
+        frame, stamp = got[0], got[1] or time.monotonic()
+        self._behind_s = stamp - time.monotonic()
+        self._monitor.dropped = self.dropped
+        return (frame, stamp) if self._monitor.note(frame, stamp) else None
+
+    @property
+    def now_s(self) -> float | None:
+        """The present on the clock of the stamps; None before the first frame."""
+        return None if self._behind_s is None else time.monotonic() + self._behind_s
+
+
+def watch_bus(monitor: Monitor, bus: can.BusABC, deadline: bool, samples: int, beat: Beat) -> None:
+    """Until `samples` have passed (0: for ever) or the beat says stop."""
+    tap = _Tap(bus, monitor)
+    monitor.dropped = tap.dropped
+    period = monitor.design.model.sample_time_s
+
+    def stop() -> bool:
+        now = tap.now_s
+        if now is not None:
+            monitor.move(now)
+        return beat(monitor.time_s)
+
+    from_bus(monitor, tap, period, deadline, samples, stop)
+
+
+def watch_log(monitor: Monitor, entries: Iterable[candump.Entry], speed: float, samples: int, beat: Beat) -> None:
+    """A log at `speed` times its own pace, infinity: at once."""
+    from_log(monitor, _played(monitor, entries, speed, beat), samples)
+    monitor.finish()
+
+
+def _played(monitor: Monitor, entries: Iterable[candump.Entry], speed: float, beat: Beat) -> Iterator[candump.Entry]:
+    began, first = time.monotonic(), None
+    for entry in entries:
+        first = entry.time_s if first is None else first
+        due = began + (entry.time_s - first) / speed
+        while (left := due - time.monotonic()) > 0.0:
+            if beat(max(monitor.time_s, entry.time_s - left * speed)):
+                return
+            time.sleep(min(left, BEAT_S))
+        if beat(entry.time_s):
+            return
+        if monitor.note(entry.frame, entry.time_s):
+            yield entry
