@@ -21,40 +21,38 @@ Beat = Callable[[float], bool]  # given the present on the clock of the stamps, 
 class _Tap(OverflowLink):
     """Hands on what concerns the detector; the monitor notes everything."""
 
-    def __init__(self, bus: can.BusABC, monitor: Monitor) -> None:
+    def __init__(self, bus: can.BusABC, monitor: Monitor, beat: Beat) -> None:
         super().__init__(bus)
-        self._monitor = monitor
+        self._monitor, self._beat = monitor, beat
         self._behind_s: float | None = None  # from this host's monotonic clock to the stamps'
 
     def receive(self, timeout_s: float) -> tuple[Frame, float] | None:
-        """None too for a frame that does not concern the detector, so that a flood of those does not keep its deadline from being looked at."""
-        got = super().receive(timeout_s)
-        if got is None:
-            return None
-        frame, stamp = got[0], got[1] or time.monotonic()
-        self._behind_s = stamp - time.monotonic()
-        self._monitor.dropped = self.dropped
-        return (frame, stamp) if self._monitor.note(frame, stamp) else None
+        """The next frame for the detector. None says that the queue was empty: what waits in it has come in time, however late it is read."""
+        end = time.monotonic() + timeout_s
+        while (got := super().receive(max(0.0, end - time.monotonic()))) is not None:
+            now = time.monotonic()
+            frame, stamp = got[0], got[1] or now
+            self._behind_s = stamp - now
+            self._monitor.dropped = self.dropped
+            if self._monitor.note(frame, stamp):
+                return frame, stamp
+            if self.stop():
+                return None
+        return None
 
-    @property
-    def now_s(self) -> float | None:
-        """The present on the clock of the stamps; None before the first frame."""
-        return None if self._behind_s is None else time.monotonic() + self._behind_s
+    def stop(self) -> bool:
+        """Time goes on, with or without frames; before the first of them by this host's clock."""
+        if self._behind_s is None:
+            return self._beat(time.time())
+        self._monitor.move(time.monotonic() + self._behind_s)
+        return self._beat(self._monitor.time_s)
 
 
 def watch_bus(monitor: Monitor, bus: can.BusABC, deadline: bool, samples: int, beat: Beat) -> None:
     """Until `samples` have passed (0: for ever) or the beat says stop."""
-    tap = _Tap(bus, monitor)
+    tap = _Tap(bus, monitor, beat)
     monitor.dropped = tap.dropped
-    period = monitor.design.model.sample_time_s
-
-    def stop() -> bool:
-        now = tap.now_s
-        if now is not None:
-            monitor.move(now)
-        return beat(monitor.time_s)
-
-    from_bus(monitor, tap, period, deadline, samples, stop)
+    from_bus(monitor, tap, monitor.design.model.sample_time_s, deadline, samples, tap.stop)
 
 
 def watch_log(monitor: Monitor, entries: Iterable[candump.Entry], speed: float, samples: int, beat: Beat) -> None:

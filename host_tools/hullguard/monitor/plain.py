@@ -31,7 +31,7 @@ def fields(s: Snapshot) -> dict[str, object]:
     """What a line says. Times in s, loads in percent of the bus, J.I the residual nearest to its threshold as in signals.csv."""
     own, ecu, told, largest = s.monitor, s.ecu, s.ecu.verdict, s.largest
     return {
-        "t": f"{s.time_s:.3f}",
+        "t": f"{s.time_s:.3f}" if s.frames else None,
         "k": own.k if own else None,
         "plant": own.plant if own else "starting",
         "may_be": own.candidates if own else (),
@@ -80,12 +80,13 @@ class Lines:
         self.monitor: Monitor | None = None
 
     def beat(self, now_s: float) -> None:
-        """A line when one is due by the clock of the stamps, with what was known then."""
+        """A line when one is due, with what was known then."""
         assert self.monitor is not None
-        if self._next is None:
+        if self._next is None or now_s < self._next - self._every:  # the first frame may bring another clock along
             self._next = now_s + self._every
         elif now_s >= self._next:
-            self.monitor.move(self._next)
+            if self.monitor.frames:
+                self.monitor.move(self._next)
             self._line("status")
             self._next += self._every * math.floor((now_s - self._next) / self._every + 1)
 

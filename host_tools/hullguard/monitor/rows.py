@@ -97,7 +97,7 @@ def head(s: Snapshot, mode: str, width: int = WIDTH) -> list[Row]:
         _ecu_row(s.ecu, width),
         _monitor_row(s, width),
         *_may_be_rows(s, width),
-        _bus_row(s, width),
+        *_bus_rows(s, width),
     ]
 
 
@@ -139,20 +139,29 @@ def _may_be_rows(s: Snapshot, width: int) -> list[Row]:
     return [Row((Cell(" MAY BE   " if i == 0 else " " * 10), left(line, width - 10)), "bold") for i, line in enumerate(lines)]
 
 
-def _unwell(v: VerdictSeen | None) -> list[str]:
-    return [] if v is None else [f"{g} {h.upper()}" for g, h in v.bus.items() if h != "good"]
+def _unwell(v: VerdictSeen | None) -> str:
+    """Senders that are not well, by what ails them."""
+    if v is None:
+        return ""
+    kinds = [h for h in BUS_STYLE if h != "good" and h in v.bus.values()]
+    return "; ".join(("all senders " if set(v.bus.values()) == {h} else ", ".join(g for g, x in v.bus.items() if x == h) + " ") + h.upper() for h in kinds)
 
 
-def _bus_row(s: Snapshot, width: int) -> Row:
+def _bus_rows(s: Snapshot, width: int) -> list[Row]:
+    """Whatever the length: what ails the bus is not cut off."""
     unwell, told = _unwell(s.monitor), _unwell(s.ecu.verdict)
-    parts = [", ".join(unwell) or ("good" if s.monitor else "unknown")]
+    off = s.errors.state != "error active"
+    parts = [unwell or ("good" if s.monitor else "unknown")]
     if told != unwell and s.ecu.verdict is not None and s.monitor is not None:
-        parts.append(f"ECU: {', '.join(told) or 'good'}")
-    if s.errors.state != "error active":
-        parts.append(f"this host's controller {s.errors.state.upper()}")
-    style = OTHER if any("STALE" in x for x in (*unwell, *told)) or s.errors.state == "bus-off" else "bold black on yellow" if unwell or told or len(parts) > 1 else ""
+        parts.append(f"ECU: {told or 'good'}")
+    if off:
+        parts.append(f"this host's controller: {s.errors.state.upper()}")
+    style = OTHER if "STALE" in unwell + told or s.errors.state == "bus-off" else "bold black on yellow" if unwell or told or off else ""
     facts = f"load {share(s.load.now)}, lost: {count(s.lost_bus)} bus, {count(s.lost_host)} host "
-    return Row((Cell(" BUS      "), left("; ".join(parts), width - 10 - len(facts)), Cell(facts)), style)
+    room = width - 10 - len(facts)
+    lines = wrap("; ".join(parts), room, break_on_hyphens=False)
+    first = Row((Cell(" BUS      "), left(lines[0], room), Cell(facts)), style)
+    return [first, *(Row((Cell(" " * 10), left(line, width - 10)), style) for line in lines[1:])]
 
 
 # ---- body ----

@@ -25,27 +25,24 @@ from hullguard.monitor.snapshot import Snapshot
 WIDE = 2 * WIDTH + 2  # columns from which on plant and bus stand side by side
 
 HELP = """\
-ECU       what the detector node on the bus says of the plant, by its verdict frames.
-MONITOR   what a second detector in here says of the same frames. It sends nothing. One
-          that began after the plant knows less for a while, and may differ from the ECU.
-MAY BE    every single fault of the model that can explain the alarm.
-BUS       senders by name. A broken bus is reported as a broken bus, never as a broken
-          plant: good, lossy (frames lost a moment ago), stale (silent for too long).
+ECU       what the detector node on the bus says, by its verdict frames
+MONITOR   what a second detector says of the same frames; it sends nothing,
+          and one that began later knows less for a while
+MAY BE    every single fault of the model that can explain the alarm
+BUS       a broken bus is reported as a broken bus, never as a broken
+          plant: senders are good, lossy, stale (silent too long), absent
+RESIDUAL  beyond |r|/J = 1 no fault-free explanation is left; most: so far
+SIGNAL    |true value - value| <= radius while the model's bounds hold
+GROUP     a sender: health of its link here and by the ECU's word, frames
+          a second, age, samples between two frames, their histogram from
+          1 to the longest that its trigger allows
+LINK      lost on the bus: by sequence counters; by host: as far as the
+          count of frames that this machine dropped explains them
+LOAD      exact bits of all frames seen; bound: the most that this model
+          can keep up; lockstep: the part that only answers ticks
 
-RESIDUAL  r and its threshold J; beyond |r|/J = 1 no fault-free explanation is left.
-          'most' is the largest |r|/J since the start, or since c.
-SIGNAL    |true value - value| <= radius while the model's bounds hold.
-GROUP     a sender: health of its link as the monitor and the ECU see it, frames a second,
-          age of its last frame, samples between two frames and their histogram, from 1 to
-          the longest that its trigger allows.
-LINK      frames lost: on the bus, by the sequence counters; by host, where this machine
-          dropped frames, as far as its own count explains them.
-LOAD      exact bits of all frames seen. 'bound' is the most that this model's senders
-          and its node can keep up; 'lockstep' the part of the mean that only answers ticks.
-
-q quit    p pause and go on    c clear figures of the past    s save the text to a file
-arrows, PgUp, PgDn scroll                                          any key closes this
-"""
+q quit   p pause, go on   c clear figures of the past   s save the text
+arrows, PgUp, PgDn, Home, End scroll                any key closes this"""
 
 
 @lru_cache(maxsize=256)
@@ -109,7 +106,7 @@ class Help(ModalScreen[None]):
     """What the words mean."""
 
     DEFAULT_CSS = (
-        "Help { align: center middle; } Help Static { width: 92; max-width: 100%; height: auto; max-height: 100%; padding: 0 1; border: round $primary; background: $surface; }"
+        "Help { align: center middle; } Help Static { width: 78; max-width: 100%; height: auto; max-height: 100%; padding: 0 1; border: round $primary; background: $surface; }"
     )
 
     def compose(self) -> ComposeResult:
