@@ -396,6 +396,8 @@ def test_json_lines(runs: dict[str, Path], cli: Cli) -> None:
     found = [json.loads(text) for text in done.out.splitlines()]
     assert done.status == 0 and found[-1]["event"] == "end" and found[-1]["samples"] == 100
     assert [g["name"] for g in found[-1]["groups"]] == ["car1", "car2", "car3", "car4", "car5", "tick"]
+    assert all(g["frames"] == g["counters"]["good"] for g in found[-1]["groups"]), "no frame of the sample that is not shown any more"
+    assert found[-1]["ecu"]["verdict"]["k"] == found[-1]["monitor"]["k"] == 99, "but all of the last one that is"
     assert len(found[-1]["residuals"]) == 29 and {"k", "plant", "candidates", "bus", "refused"} == set(found[-1]["monitor"])
 
 

@@ -27,7 +27,7 @@ from hullguard.model import load_model
 from hullguard.monitor.rows import ALARMED, bus_rows, head, plant_rows
 from hullguard.monitor.snapshot import Snapshot
 from hullguard.monitor.state import Monitor
-from hullguard.monitor.view import Help, Sheet, View
+from hullguard.monitor.view import HELP, Help, Sheet, View
 from textual.pilot import Pilot
 
 FAST_HZ = 50.0
@@ -140,7 +140,8 @@ def test_keys(seen: Seen, tmp_path: Path) -> None:
         assert "observer 29" in saved and "unknown ids" in saved, "all rows, not only those on the screen"
         await pilot.press("question_mark")
         assert isinstance(view.screen, Help)
-        assert "never as a broken" in "".join(screen(view))
+        assert "never as a broken" in "".join(screen(view)) and "any key closes this" in "".join(screen(view)), "all of it, on 80 x 24 too"
+        assert max(map(len, HELP.splitlines())) <= 74
         await pilot.press("x")
         assert not isinstance(view.screen, Help)
         view._folder = tmp_path / "nowhere"

@@ -92,8 +92,9 @@ def _source(args: argparse.Namespace, monitor: Monitor, plain: bool) -> Iterator
         yield lambda beat: watch_log(monitor, entries, speed, samples, beat)
         return
     options = bus_options(args)
-    if options.get("interface") == "socketcan":
-        options.setdefault("fd", True)  # frames of others count as well
+    tables = monitor.native.tables
+    if options.get("interface") == "socketcan" or any(m.flags & candump.FD for m in (*(g.message for g in tables.groups), tables.verdict, tables.status)):
+        options.setdefault("fd", True)  # SocketCAN needs no telling of speeds, and frames of others count as well
     with opened(**options) as link:
         yield lambda beat: watch_bus(monitor, link.bus, not args.lockstep, samples, beat)
 

@@ -56,14 +56,16 @@ def watch_bus(monitor: Monitor, bus: can.BusABC, deadline: bool, samples: int, b
 
 
 def watch_log(monitor: Monitor, entries: Iterable[candump.Entry], speed: float, samples: int, beat: Beat) -> None:
-    """A log at `speed` times its own pace, infinity: at once."""
-    from_log(monitor, _played(monitor, entries, speed, beat), samples)
+    """A log at `speed` times its own pace, infinity: at once. After the last sample the ECU has its say, before the next one begins."""
+    from_log(monitor, _played(monitor, entries, speed, samples, beat), 0)
     monitor.finish()
 
 
-def _played(monitor: Monitor, entries: Iterable[candump.Entry], speed: float, beat: Beat) -> Iterator[candump.Entry]:
+def _played(monitor: Monitor, entries: Iterable[candump.Entry], speed: float, samples: int, beat: Beat) -> Iterator[candump.Entry]:
     began, first = time.monotonic(), None
     for entry in entries:
+        if samples and monitor.samples >= samples and monitor.concerns(entry.frame):
+            return
         first = entry.time_s if first is None else first
         due = began + (entry.time_s - first) / speed
         while (left := due - time.monotonic()) > 0.0:

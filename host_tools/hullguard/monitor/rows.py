@@ -8,8 +8,8 @@ from textwrap import wrap
 
 from rich.cells import set_cell_size
 
-from hullguard.monitor.snapshot import EcuSeen, GroupSeen, Snapshot, VerdictSeen
-from hullguard.report.live import ALARMED, BUS_STYLE, PLANT_SAYS, PLANT_STYLE
+from hullguard.monitor.snapshot import EcuSeen, GroupSeen, Snapshot
+from hullguard.report.live import ALARMED, PLANT_SAYS
 
 WIDTH = 80  # of the smallest screen
 BODY = WIDTH - 2  # below the head: a margin on the left, a scroll bar on the right
@@ -18,8 +18,12 @@ SPARKS = "▁▂▃▄▅▆▇█"
 NONE_BIN = "·"  # an interval that has not come
 BINS = 10
 CHANGES = 6
-TITLE, DIM, WARN, BAD = "bold underline", "dim", "bold yellow", "bold white on red"
-OTHER = "bold white on magenta"
+TITLE, DIM = "bold underline", "dim"
+# Warm is the plant, cold is the bus: one is not taken for the other at a glance either.
+WARN, BAD = "bold #e69f00", "bold #ffffff on #c4001a"
+BUS_ILL, BUS_BAD = "bold #ffffff on #0072b2", "bold #ffffff on #5e35b1"
+PLANT_STYLE = {"starting": DIM, "none": "bold", "provisional": "bold black on #e69f00", "confirmed": BAD}
+BUS_STYLE = {"good": "", "absent": DIM, "lossy": BUS_ILL, "stale": BUS_BAD}
 
 
 @dataclass(frozen=True)
@@ -114,9 +118,9 @@ def _ecu_row(ecu: EcuSeen, width: int) -> Row:
         return row("not heard", "no verdict or status frame has come", DIM)
     said = _says(ecu.verdict.plant) if ecu.verdict else "no verdict yet"
     if ecu.model == "other":
-        return row(said, f"RUNS ANOTHER MODEL, {ecu.hash}", OTHER)
+        return row(said, f"RUNS ANOTHER MODEL, {ecu.hash}", BUS_BAD)
     if ecu.state == "silent":
-        return row("SILENT", f"for {seconds(ecu.age_s)} s; said last: {said}", OTHER)
+        return row("SILENT", f"for {seconds(ecu.age_s)} s; said last: {said}", BUS_BAD)
     k = f"k {ecu.verdict.k}, " if ecu.verdict else ""
     alive = "no heartbeat yet" if ecu.heartbeat_s is None else f"heartbeat {seconds(ecu.heartbeat_s)} s ago, model matches"
     agrees = {None: "", True: ", agrees", False: ", differs"}[ecu.agrees]
@@ -139,24 +143,16 @@ def _may_be_rows(s: Snapshot, width: int) -> list[Row]:
     return [Row((Cell(" MAY BE   " if i == 0 else " " * 10), left(line, width - 10)), "bold") for i, line in enumerate(lines)]
 
 
-def _unwell(v: VerdictSeen | None) -> str:
-    """Senders that are not well, by what ails them."""
-    if v is None:
-        return ""
-    kinds = [h for h in BUS_STYLE if h != "good" and h in v.bus.values()]
-    return "; ".join(("all senders " if set(v.bus.values()) == {h} else ", ".join(g for g, x in v.bus.items() if x == h) + " ") + h.upper() for h in kinds)
-
-
 def _bus_rows(s: Snapshot, width: int) -> list[Row]:
     """Whatever the length: what ails the bus is not cut off."""
-    unwell, told = _unwell(s.monitor), _unwell(s.ecu.verdict)
+    unwell, told = (v.unwell(str.upper) if v else "" for v in (s.monitor, s.ecu.verdict))
     off = s.errors.state != "error active"
     parts = [unwell or ("good" if s.monitor else "unknown")]
     if told != unwell and s.ecu.verdict is not None and s.monitor is not None:
         parts.append(f"ECU: {told or 'good'}")
     if off:
         parts.append(f"this host's controller: {s.errors.state.upper()}")
-    style = OTHER if "STALE" in unwell + told or s.errors.state == "bus-off" else "bold black on yellow" if unwell or told or off else ""
+    style = BUS_BAD if "STALE" in unwell + told or s.errors.state == "bus-off" else BUS_ILL if unwell or told or off else ""
     facts = f"load {share(s.load.now)}, lost: {count(s.lost_bus)} bus, {count(s.lost_host)} host "
     room = width - 10 - len(facts)
     lines = wrap("; ".join(parts), room, break_on_hyphens=False)
@@ -236,7 +232,7 @@ def _links(s: Snapshot) -> list[Row]:
 
 def _load(s: Snapshot) -> list[Row]:
     x = s.load
-    names = ("last 1 s", "mean", "peak 0.1 s", "p99 1 s", "bound", "lockstep")
+    names = ("last 1 s", "mean", "peak 0.1 s", "p99 1 s", "mean bound", "lockstep")
     values = (x.now, x.mean, x.peak, x.p99, x.bound, x.mean * x.reply_bits / x.bits if x.bits else 0.0)
     widths = (10, 10, 12, 10, 12, 10)
     return [

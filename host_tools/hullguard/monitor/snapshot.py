@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+
+AILMENTS = ("stale", "lossy", "absent")
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,12 @@ class VerdictSeen:
     candidates: tuple[str, ...]
     bus: dict[str, str]
     refused: bool
+
+    def unwell(self, say: Callable[[str], str] = str) -> str:
+        """Senders whose link is not good, by what ails them, worst first; `say` spells the ailment."""
+        kinds = [h for h in AILMENTS if h in self.bus.values()]
+        names = {h: [g for g, x in self.bus.items() if x == h] for h in kinds}
+        return "; ".join(("all senders" if len(names[h]) == len(self.bus) > 1 else ", ".join(names[h])) + f" {say(h)}" for h in kinds)
 
 
 @dataclass(frozen=True)

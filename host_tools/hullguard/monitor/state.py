@@ -84,6 +84,10 @@ class Monitor(Detector):
         if self._said.get("ecu") and self.ecu.state(self.time_s) == "silent":
             self._say("ecu", "silent")
 
+    def concerns(self, frame: Frame) -> bool:
+        """Whether a frame carries the identifier of a group."""
+        return not frame.flags & ERROR and (frame.id, frame.flags & EXTENDED) in self._place
+
     def note(self, frame: Frame, time_s: float) -> bool:
         """Count a frame from the bus; True if it concerns the detector."""
         self.move(time_s)
@@ -206,5 +210,4 @@ def _ratio(r: float, J: float) -> float:
 
 def in_words(v: VerdictSeen, known_faults: bool) -> str:
     """A verdict in a line: the plant and, apart from it, the bus."""
-    unwell = ", ".join(f"{g} {h}" for g, h in v.bus.items() if h != "good")
-    return f"plant {v.plant}{may_be(v.plant, v.candidates, known_faults)}; bus {unwell or 'good'}" + ("; a number was refused" if v.refused else "")
+    return f"plant {v.plant}{may_be(v.plant, v.candidates, known_faults)}; bus {v.unwell() or 'good'}" + ("; a number was refused" if v.refused else "")

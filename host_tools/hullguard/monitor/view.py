@@ -26,8 +26,8 @@ WIDE = 2 * WIDTH + 2  # columns from which on plant and bus stand side by side
 
 HELP = """\
 ECU       what the detector node on the bus says, by its verdict frames
-MONITOR   what a second detector says of the same frames; it sends nothing,
-          and one that began later knows less for a while
+MONITOR   what a second detector says of the same frames; it sends none,
+          and if it began later, it knows less for a while
 MAY BE    every single fault of the model that can explain the alarm
 BUS       a broken bus is reported as a broken bus, never as a broken
           plant: senders are good, lossy, stale (silent too long), absent
@@ -38,8 +38,8 @@ GROUP     a sender: health of its link here and by the ECU's word, frames
           1 to the longest that its trigger allows
 LINK      lost on the bus: by sequence counters; by host: as far as the
           count of frames that this machine dropped explains them
-LOAD      exact bits of all frames seen; bound: the most that this model
-          can keep up; lockstep: the part that only answers ticks
+LOAD      exact bits of all frames seen; mean bound: the most that this
+          model can keep up; lockstep: the part that only answers ticks
 
 q quit   p pause, go on   c clear figures of the past   s save the text
 arrows, PgUp, PgDn, Home, End scroll                any key closes this"""
