@@ -406,7 +406,8 @@ def test_quiet_and_files(runs: dict[str, Path], cli: Cli, tmp_path: Path) -> Non
     assert (done.status, done.out, done.err) == (0, "", "")
     text = (tmp_path / "a.txt").read_text(encoding="utf-8")
     assert "FAULT CONFIRMED" in text and "gap12_m" in text and max(len(x) for x in text.splitlines()) <= rows.WIDTH
-    assert (tmp_path / "a.svg").read_text(encoding="utf-8").startswith("<svg")
+    svg = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert svg.startswith("<svg") and "CONFIRMED" in svg and "url(http" not in svg, "nothing that a viewer would have to load"
 
 
 WRONG = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from pathlib import Path
 
 from hullguard.errors import InputError
@@ -35,4 +36,5 @@ async def _svg(s: Snapshot, mode: str) -> str:
     rows = len(head(s, mode)) + len(plant_rows(s)) + len(bus_rows(s)) + 1  # the keys
     async with view.run_test(size=(WIDTH, rows)) as pilot:
         await pilot.pause()
-        return view.export_screenshot(title=f"hullguard monitor {s.model}")
+        svg = view.export_screenshot(title=f"hullguard monitor {s.model}")
+    return re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)  # they are loaded from the net; a viewer has a font of its own
