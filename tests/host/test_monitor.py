@@ -171,6 +171,19 @@ def test_a_monitor_that_begins_in_the_middle(made: dict[str, tuple[Design, Nativ
         assert g.lost_bus == g.lost_host == 0
 
 
+@pytest.mark.parametrize("samples", [30, 32])
+def test_no_interval_spans_an_outage(samples: int, made: dict[str, tuple[Design, Native]], runs: dict[str, Path]) -> None:
+    """Whether or not the stamps are alike on both sides of it."""
+    log = [e for e in entries(runs["platoon"]) if not 9.95 < e.time_s < 9.95 + samples * 0.1]
+    s = fed(monitor(made["platoon"]), log).snapshot()
+    run = json.loads((runs["platoon"] / "run.json").read_text())
+    assert s.outages == 1
+    for g in s.groups:
+        assert g.intervals.most == run["per_group"][g.name]["interval_max"]
+        frames = sum(e.frame.id == g.id for e in log)
+        assert sum(g.intervals.histogram.values()) <= frames - 2, "one interval fewer than frames, on each side"
+
+
 def test_losses_on_the_bus_and_by_the_host_are_told_apart(made: dict[str, tuple[Design, Native]], runs: dict[str, Path]) -> None:
     """Frames are taken out of a log; for one half of the gaps the host's count rises by what is missing, as the kernel tells it."""
     log, rng = entries(runs["platoon"]), random.Random(SEED)

@@ -126,21 +126,27 @@ class Monitor(Detector):
     def take(self, frame: Frame, time_s: float) -> None:
         """A frame that concerns the detector: booked, and its group's intervals and losses with it."""
         place = self._place[(frame.id, frame.flags & EXTENDED)]
-        group, before, k = self.groups[place], self._health(place), int(self.node.node.k)
+        group, before, k, outages = self.groups[place], self._health(place), int(self.node.node.k), self.outages
         super().take(frame, time_s)
+        if self.outages != outages:
+            self._jumped()
         after = self._health(place)
         group.lost(after["lost"] - before["lost"], self.dropped)
         if after["good"] > before["good"]:
             group.booked(self.verdict.k if place == self.native.tables.closing and self.verdict is not None else k)
 
     def _step(self, v: Verdict) -> None:
-        if self.verdict is None or v.k != self.verdict.k + 1:
-            for group in self.groups:  # the sample index has jumped: no interval spans that
-                group.last_k = group.last_k if self.verdict is None and v.k == 0 else None
+        if v.k != (0 if self.verdict is None else self.verdict.k + 1):
+            self._jumped()
         self.verdict = v
         for i, (r, J) in enumerate(zip(self.node.r, self.node.J, strict=True)):
             self._most[i] = max(self._most[i], _ratio(r, J))
         self._say("monitor", named(self.design, v))
+
+    def _jumped(self) -> None:
+        """The sample index has lost its hold: no interval spans that."""
+        for group in self.groups:
+            group.last_k = None
 
     def finish(self) -> None:
         """The end of a log."""
