@@ -133,6 +133,20 @@ def build_parser() -> argparse.ArgumentParser:
     _expect(p)
     _bus(p)
 
+    p = add("monitor", "live view of a bus or a log: signals with radii, residuals, verdicts, senders, load, losses")
+    _common(p)
+    _scenario(p)
+    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus: played at its own speed in the view, at once as lines")
+    p.add_argument("--speed", metavar="X", help="max, or a multiple of the log's own speed")
+    p.add_argument("--plain", action="store_true", help="lines of key=value, also where stdout is no terminal; --json: a JSON object a line")
+    p.add_argument("--every", type=float, default=1.0, metavar="S", help="seconds between two such lines (default 1); a change has its own line at once")
+    p.add_argument("--rate", type=float, default=5.0, metavar="HZ", help="pictures a second (default 5)")
+    p.add_argument("--rest", action="store_true", help="the first frame is of a plant within its initial range (default: anywhere in its range)")
+    p.add_argument("--lockstep", action="store_true", help="the bus keeps no time: no deadline for the closing frame")
+    p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
+    p.add_argument("--snapshot", action="append", default=[], metavar="FILE", help="the last screen as FILE.svg or FILE.txt; may be given more than once")
+    _bus(p)
+
     p = add("plant", "the emulated plant and its senders alone, on a bus with a node of your own")
     _common(p)
     _scenario(p)
@@ -182,6 +196,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
+    from hullguard.monitor.command import run_monitor
 
     return {
         "design": commands.run_design,
@@ -189,6 +204,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "replay": commands.run_replay,
         "detect": commands.run_detect,
         "plant": commands.run_plant,
+        "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
         "report": commands.run_report,

@@ -311,7 +311,7 @@ def bus_options(args: argparse.Namespace) -> dict[str, Any]:
 @contextlib.contextmanager
 def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any], start: int) -> Iterator[tuple[Bus, Pace, str]]:
     """The bus of a run, with a detector node at its other end."""
-    speed = _speed(args.speed)
+    speed = make_speed(args.speed)
     pace = Pace(speed != 1.0, speed)  # only a real-time run uses the node's timer; at any other speed the run is deterministic
     if not options and args.bus == "auto":
         found = choose.existing_vcan()
@@ -332,7 +332,8 @@ def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[s
         yield OnCan(link, native, pace), pace, name
 
 
-def _speed(text: str) -> float:
+def make_speed(text: str) -> float:
+    """--speed: a multiple of real time; infinity for max."""
     if text == "max":
         return math.inf
     try:
@@ -435,7 +436,7 @@ def run_plant(args: argparse.Namespace) -> int:
     native = Native(library(args.real), made.tables)
     source = Plant(native, made, scenario.reference, faults, args.seed)
     options = bus_options(args) or {"interface": "socketcan", "channel": choose.existing_vcan() or "vcan0"}
-    pace = Pace(args.lockstep, _speed(args.speed))
+    pace = Pace(args.lockstep, make_speed(args.speed))
     with opened(**options) as link:
         run = Run(made, native, OnCan(link, native, pace), pace, start=MOVING if args.moving else REST)
         trace = run.samples(source, samples)
