@@ -116,10 +116,8 @@ def after_data(data: int) -> np.ndarray:
 def longest_classic(length: int, flags: int) -> Frame:
     """A frame of this length with the most stuff bits, over all identifiers and data: dynamic programming over CRC register and stuffing state."""
     free: list[int | None] = [None]
-    if flags & EXTENDED:
-        header = [0, *free * 11, 1, 1, *free * 18, 0, 0, 0, *binary(length, 4)]
-    else:
-        header = [0, *free * 11, 0, 0, 0, *binary(length, 4)]
+    extension = [1, 1, *free * 18, 0] if flags & EXTENDED else [0]  # with RTR
+    header = [0, *free * 11, *extension, 0, 0, *binary(length, 4)]
     plan = [*header, *free * (8 * length)]
     values = [after_data(8 * length)]
     for bit in reversed(header):

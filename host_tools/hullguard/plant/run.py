@@ -300,7 +300,7 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
 
 
 def switches(model: Model) -> bool:
-    """Has the bus a second bit rate, so that bits alone do not tell the load?"""
+    """Whether the bus has a second bit rate, so that bits alone do not tell the load."""
     return model.data_bitrate_bps != model.bitrate_bps
 
 
