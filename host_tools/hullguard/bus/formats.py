@@ -84,9 +84,9 @@ def _write_blf(path: Path, entries: Sequence[Entry]) -> None:
 
 
 def _start(entries: Sequence[Entry]) -> float:
-    """Begin of a recording, whole milliseconds, as its header has it."""
+    """Begin of a recording, the date in its header. Whole seconds: python-can writes 59 ms as .59."""
     first = min((e.time_s for e in entries), default=0.0)
-    return math.floor(first * 1000) / 1000 if first >= FIRST_DATE_S else 0.0
+    return float(math.floor(first)) if first >= FIRST_DATE_S else 0.0
 
 
 def _read_asc(path: Path) -> Iterator[Entry]:
@@ -97,7 +97,7 @@ def _read_asc(path: Path) -> Iterator[Entry]:
 def _write_asc(path: Path, entries: Sequence[Entry]) -> None:
     channel = numbers(entries)
     with can.ASCWriter(path) as writer:
-        writer.log_event("Start of measurement", _start(entries))  # its header has the date of the first line, in milliseconds
+        writer.log_event("Start of measurement", _start(entries))  # its header has the date of the first line
         for e in entries:
             writer(to_numbered(e, channel[e.channel]))
 

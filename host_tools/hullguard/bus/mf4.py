@@ -74,4 +74,5 @@ def write(path: Path, entries: Sequence[Entry], channel: Mapping[str, int], star
                     samples[field][i] = value
             times = np.array([e.time_s - start_s for e in chosen], dtype="<f8")
             file.append(asammdf.Signal(name=name, samples=samples, timestamps=times, source=SourceInformation(source_type=SOURCE_BUS, bus_type=BUS_TYPE_CAN)))
-        file.save(path, overwrite=True, compression=2)
+        with path.open("w+b") as out:  # given a name, asammdf would choose the suffix
+            file.save(out, compression=2)

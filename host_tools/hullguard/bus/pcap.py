@@ -195,6 +195,8 @@ def _entry(interface: _Interface, time_s: float, packet: bytes, order: str, dire
         packet, fd = packet[header:], protocol == _ETH_CANFD
     else:
         raise ValueError(f"link type {interface.link}, where CAN has {SOCKETCAN}")
+    if interface.per_s <= 1_000_000:
+        time_s = round(time_s, 6)  # sums leave a trace in the last digit
     number, length, bits = struct.unpack_from(order + "IBB", packet)
     fd = fd or bool(bits & _FDF) or len(packet) == _FD_SIZE
     return _frame(interface.name, time_s, number, length, bits if fd else 0, fd, packet[_HEADER:], direction)
