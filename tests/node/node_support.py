@@ -12,6 +12,7 @@ HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build"
 NODE = {"f32": BUILD / "bin" / "detector_node", "f64": BUILD / "bin" / "detector_node_f64"}
 BUS_TIMER = BUILD / "node" / "bus_timer"
+VIRTUAL_NODE = BUILD / "node" / "virtual_node"
 ORACLE_RUN = BUILD / "oracle" / "oracle_run"
 WITH_VCAN = BUILD / "with-vcan" / "with-vcan"
 # The seed of tests/host when both run in one session.
