@@ -92,7 +92,8 @@ def test_frame_to_verdict_and_fault_to_flag(model: str, scenario: str, cli: Cli,
     for fault in result["faults"]:
         flag = min(k for k in alarms if k >= fault["start"])
         assert flag == fault["detected_at"] and flag - fault["start"] == fault["delay"]
-        print(f"{model}: fault at {fault['start'] * period:g} s, flag {told[flag][0] - fault['start'] * period:.3f} s later ({fault['delay']} samples); verdict 0 us after its closing frame")
+        late = told[flag][0] - fault["start"] * period
+        print(f"{model}: fault at {fault['start'] * period:g} s, flag {late:.3f} s later ({fault['delay']} samples); verdict 0 us after its closing frame")
 
 
 # ---- a sender's silence ----

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import io
+import json
 import random
 import re
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hullguard.bus import formats
 from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE, Entry
+from hullguard.cli import main
 from hullguard.core.library import library
 from hullguard.core.native import Frame, frame_bits
 from inside_support import link, recorded
@@ -86,19 +90,35 @@ def test_a_live_capture_is_read(name: str, played: tuple[list[Entry], Path]) -> 
     assert kept(bare(found)) == kept([replace(e, channel=name) for e in bare(many)])
 
 
+@contextlib.contextmanager
+def busload(path: Path) -> Iterator[list[int]]:
+    """What canbusload -e counts: frames, bits, bits of data; known at the end."""
+    seen: list[int] = []
+    with recorded(path, "stdbuf", "-oL", "canbusload", "-e", "vcan0@500000"):
+        yield seen
+        time.sleep(2.2)  # it tells every second
+    rows = [tuple(map(int, m.groups())) for m in re.finditer(r"vcan0@500000\s+(\d+)\s+(\d+)\s+(\d+)\s+\d+%", path.read_text())]
+    seen += [sum(column) for column in zip(*rows, strict=True)]
+
+
 def test_canbusload_counts_the_same_bits(tmp_path: Path) -> None:
     """Classic frames, data and remote, standard and extended, with -e; it has no exact length of CAN FD."""
     rng = random.Random(SEED)
     patterns = (0x00, 0xFF, 0x0F, 0x78, 0x55)
     frames = [Frame(rng.randrange(0x800), 0, bytes(rng.choice(patterns) for _ in range(rng.randrange(9)))) for _ in range(150)]
     frames += [Frame(rng.randrange(0x20000000), EXTENDED, rng.randbytes(rng.randrange(9))) for _ in range(150)]
-    with link() as bus, recorded(tmp_path / "load", "stdbuf", "-oL", "canbusload", "-e", "vcan0@500000"):
+    with link() as bus, busload(tmp_path / "load") as seen:
         for frame in frames:
             bus.send(frame)
-        time.sleep(2.5)  # it tells every second
-    rows = [tuple(map(int, m.groups())) for m in re.finditer(r"vcan0@500000\s+(\d+)\s+(\d+)\s+(\d+)\s+\d+%", (tmp_path / "load").read_text())]
-    own = sum(frame_bits(library("f32"), f) for f in frames)
-    print(f"TIMING canbusload -e: {sum(r[1] for r in rows)} bits of {sum(r[0] for r in rows)} frames, hullguard {own}")
-    assert sum(r[0] for r in rows) == len(frames)
-    assert sum(r[1] for r in rows) == own
-    assert sum(r[2] for r in rows) == sum(8 * len(f.data) for f in frames)
+    assert seen == [len(frames), sum(frame_bits(library("f32"), f) for f in frames), sum(8 * len(f.data) for f in frames)]
+
+
+def test_canbusload_sees_the_load_of_a_run(tmp_path: Path) -> None:
+    """All frames of a run, those that only lockstep adds included."""
+    out = io.StringIO()
+    with busload(tmp_path / "load") as seen, contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()):
+        assert main(["run", "platoon", "--seed", str(SEED), "--bus", "vcan0", "--json"]) == 0
+    frames = json.loads(out.getvalue())["frames"]
+    print(f"TIMING bits of a run: canbusload -e {seen[1]}, hullguard {frames['bits']} and {frames['bits_lockstep_replies']} of lockstep replies")
+    assert seen[0] == frames["total"] + frames["lockstep_replies"]
+    assert seen[1] == frames["bits"] + frames["bits_lockstep_replies"]

@@ -48,11 +48,12 @@ def test_latency_from_frame_to_verdict(tmp_path: Path) -> None:
             told = read_verdict(drive.native, e.frame)
             if told is not None and told.plant == "confirmed":
                 flagged.append(told.k)
+    flag_us = latency["vcan0"][flagged[0]] * 1e6
     table = [
         f"latency on {os.environ.get('WITH_VCAN', 'vcan')}, {SAMPLES} samples, us:   p50      p90      p99      max",
         f"  closing frame to verdict (detector_node)   {us(latency['vcan0'])}",
         f"  the same frame echoed (the host alone)     {us(latency['vcan1'])}",
-        f"  fault to flag: sample {FAULT} to {flagged[0]}, {flagged[0] - FAULT} samples, as in process; verdict frame {latency['vcan0'][flagged[0]] * 1e6:.0f} us after its closing frame",
+        f"  fault to flag: sample {FAULT} to {flagged[0]}, {flagged[0] - FAULT} samples, as in process; verdict frame {flag_us:.0f} us after its closing frame",
     ]
     print("\n".join(f"TIMING {line}" for line in table))
     # Host and guest schedule as they please; what they cannot change: each frame is answered once, afterwards, and in its own sample.

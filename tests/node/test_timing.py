@@ -123,7 +123,8 @@ def test_no_deadline_is_noticed_early(timing_files: Path) -> None:
     late = sorted(m.end - m.start for m in seen.misses)
     assert late and late[0] >= 0
     wake = seen.watch["longest_wake_us"] - PERIOD_US
-    print(f"TIMING {len(late)} missed deadlines at T = {PERIOD_US} us noticed {late[0]} .. {late[-1]} us late, median {late[len(late) // 2]}; a bare timer beside it up to {wake} us late")
+    noticed = f"noticed {late[0]} .. {late[-1]} us late, median {late[len(late) // 2]}"
+    print(f"TIMING {len(late)} missed deadlines at T = {PERIOD_US} us {noticed}; a bare timer beside it up to {wake} us late")
 
 
 def test_the_judge() -> None:
