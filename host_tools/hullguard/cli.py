@@ -84,6 +84,7 @@ def _drive(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--speed", default="max", metavar="X", help="max (default), or a multiple of real time; 1 is real time, with the node's timer, any other in lockstep")
     parser.add_argument("--out", metavar="DIR", help="write run.log, run.json, signals.csv, labels.csv, the DBC and report.html there")
+    parser.add_argument("--formats", metavar="F[,F..]", default="", help="with --out: the log as run.F too, F of pcap, pcapng, blf, mf4, asc")
     _expect(parser)
     _bus(parser)
 
@@ -121,10 +122,10 @@ def build_parser() -> argparse.ArgumentParser:
     _faults(p)
     _drive(p)
 
-    p = add("detect", "the detector on any python-can interface, or on a candump log")
+    p = add("detect", "the detector on any python-can interface, or on a recorded log")
     _common(p)
     _scenario(p)
-    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus")
+    p.add_argument("--log", metavar="FILE", help="recording instead of a bus: .log (candump -L), .pcap, .pcapng, .blf, .mf4 or .asc")
     p.add_argument("--lockstep", action="store_true", help="answer every closing frame with a verdict; no deadline")
     p.add_argument("--rest", action="store_true", help="the plant starts within its initial range (default: anywhere in its range)")
     p.add_argument("--listen", action="store_true", help="send nothing")
@@ -187,6 +188,13 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
 
+    p = add("convert", "recordings of CAN frames from one format into another, by suffix: .log (candump -L), .pcap, .pcapng, .blf, .mf4, .asc")
+    p.add_argument("source", metavar="IN", help="recording to read")
+    p.add_argument("target", metavar="OUT", help="file to write; with --dbc it may be .csv: signals for PlotJuggler")
+    p.add_argument("--channel", metavar="NAME", help="only frames of this channel (default: all)")
+    p.add_argument("--dbc", metavar="FILE", help="what the frames mean, for a .csv")
+    _output(p)
+
     p = add("report", "draw report.html from the files of a run, or campaign.html from those of a campaign")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run or campaign")
     p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
@@ -207,6 +215,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
+        "convert": commands.run_convert,
         "report": commands.run_report,
     }
 

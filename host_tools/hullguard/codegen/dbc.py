@@ -264,7 +264,8 @@ def _enumeration(names: Iterable[str]) -> str:
     return "ENUM " + ",".join(quoted(n) for n in names)
 
 
-def _attribute_definitions() -> list[str]:
+def _attribute_definitions(any_fd: bool) -> list[str]:
+    fast = ['BA_DEF_ "BaudrateCANFD" INT 0 20000000;', 'BA_DEF_DEF_ "BaudrateCANFD" 0;'] if any_fd else []
     return [
         'BA_DEF_ "BusType" STRING ;',
         'BA_DEF_ "Baudrate" INT 0 8000000;',
@@ -284,8 +285,10 @@ def _attribute_definitions() -> list[str]:
         'BA_DEF_ BO_ "E2ECounterBit" INT 0 511;',
         'BA_DEF_ BO_ "E2ENibbleBit" INT 0 511;',
         'BA_DEF_ BO_ "E2EStampBit" INT -1 511;',
+        *fast[:1],
         'BA_DEF_DEF_ "BusType" "CAN";',
         'BA_DEF_DEF_ "Baudrate" 500000;',
+        *fast[1:],
         'BA_DEF_DEF_ "HullguardModel" "";',
         'BA_DEF_DEF_ "HullguardModelSha256" "";',
         'BA_DEF_DEF_ "HullguardModelHash" "";',
@@ -311,6 +314,7 @@ def _attributes(design: Design, made: Sequence[Message]) -> list[str]:
     lines = [
         f'BA_ "BusType" {quoted("CAN FD" if any_fd else "CAN")};',
         f'BA_ "Baudrate" {model.bitrate_bps};',
+        *([f'BA_ "BaudrateCANFD" {model.data_bitrate_bps};'] if any_fd else []),
         f'BA_ "HullguardModel" {quoted(tables.name)};',
         f'BA_ "HullguardModelSha256" {quoted(model.sha256)};',
         f'BA_ "HullguardModelHash" "0x{tables.hash:08X}";',
@@ -350,7 +354,7 @@ def emit_dbc(design: Design) -> str:
     lines = ['VERSION ""', "", "NS_ :", *(f"\t{s}" for s in SYMBOLS.split()), "", "BS_:", "", "BU_: " + " ".join(senders), ""]
     for m in made:
         lines += _message_lines(m)
-    lines += ["", *_comments(design, made), *_attribute_definitions(), *_attributes(design, made)]
+    lines += ["", *_comments(design, made), *_attribute_definitions(any(m.table.flags & FD for m in made)), *_attributes(design, made)]
     for m in made:
         for e in m.entries:
             if e.values:

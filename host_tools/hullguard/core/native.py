@@ -195,6 +195,11 @@ def frame_bits(library: Library, frame: Frame) -> int:
     return int(library.lib.hgh_frame_bits(frame_in(library, frame)))
 
 
+def data_bits(library: Library, frame: Frame) -> int:
+    """Of these, the ones at the data bit rate, exact: 0 unless an FD frame switches."""
+    return int(library.lib.hgh_frame_data_bits(frame_in(library, frame)))
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What a verdict frame says, or a node's record of it."""

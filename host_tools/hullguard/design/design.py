@@ -273,7 +273,7 @@ def finish(model: Model, stored: Stored) -> Design:
     generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers)))
     tables = _tables(model, groups, generators, derived, _banks(model, stored, derived))
     _unique_ids(model, tables)
-    bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
+    bound = load_bound(tables, model.bitrate_bps, model.sample_time_s, model.data_bitrate_bps)
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)

@@ -184,6 +184,7 @@ class Model:
     path: Path
     sample_time_s: float
     bitrate_bps: int
+    data_bitrate_bps: int  # of CAN FD frames; bitrate_bps where the model does not say
     load_max: float
     plant: Plant
     signals: tuple[Signal, ...]
@@ -346,6 +347,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     sample_time_s = top.number("sample_time_s", 1e-6, 3600.0)
     bus = top.table("bus", optional=True)
     bitrate = bus.whole("bitrate_bps", 10_000, 8_000_000, 500_000)
+    data_bitrate = bus.whole("data_bitrate_bps", bitrate, 20_000_000, bitrate)
     load_max = bus.number("load_max", 0.01, 1.0, 0.7)
     bus.close()
 
@@ -384,6 +386,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         path=path,
         sample_time_s=sample_time_s,
         bitrate_bps=bitrate,
+        data_bitrate_bps=data_bitrate,
         load_max=load_max,
         plant=plant,
         signals=signals,

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from hullguard.bus.bits import worst_bits
+from hullguard.bus.bits import worst_bit_times, worst_bits
 from hullguard.design.design import Design, Generator
 from hullguard.design.ids import ERRORS, undetected_patterns
 from hullguard.design.isolation import Pair
@@ -77,10 +77,11 @@ def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
 
 def _summary(design: Design) -> Iterator[str]:
     model, passed = design.model, sum(c.passed for c in design.checks)
+    fast = f", {num(model.data_bitrate_bps / 1000)} kbit/s in data phases" if model.data_bitrate_bps != model.bitrate_bps else ""
     yield f"<h1>hullguard design: {esc(model.name)}</h1>"
     yield (
         f'<p class="note">{plural(model.plant.n, "state")}, {plural(model.plant.m, "output")}, {plural(model.plant.p, "input")}; {num(model.sample_time_s * 1000)} ms; '
-        f"{num(model.bitrate_bps / 1000)} kbit/s; model hash <code>{design.tables.hash:08x}</code></p>"
+        f"{num(model.bitrate_bps / 1000)} kbit/s{fast}; model hash <code>{design.tables.hash:08x}</code></p>"
     )
     yield f'<p class="lead">{esc(_judging(design))}; {passed} of {len(design.checks)} checks passed.</p>'
     used = [g for g in design.generators if g.filter.regularised > 0]
@@ -187,7 +188,7 @@ def _frames(design: Design) -> str:
                 *_protection(message),
                 bits,
                 every,
-                percent(bits / every / period),
+                percent(worst_bit_times(message, model.bitrate_bps, model.data_bitrate_bps) / every / period),
             ]
         )
     rows.append(["all", "", "", "", "", "", "", "", percent(design.load_bound)])
