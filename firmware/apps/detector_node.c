@@ -311,22 +311,31 @@ static void make_steps(app *self)
 
 /* Has this node fallen behind its sender by more samples than a stamp can tell? Frames that waited for a stopped process carry the time of
  * their arrival. Any frame of the model tells, not the closing one alone: a measurement could be booked to a sample 16 earlier. */
-static bool outage(const app *self, uint64_t at_us)
+static uint64_t samples_behind(const app *self, uint64_t at_us)
 {
     const uint64_t period_us = self->options.period_us;
-    if (self->options.lockstep || (!self->node->closed) || (at_us < self->closing_us)) {
-        return false;
-    }
     const uint64_t elapsed = ((at_us - self->closing_us) + (period_us / 2U)) / period_us;
-    return elapsed > ((self->steps - self->closing_steps) + 1U + STAMPS_AHEAD);
+    const uint64_t closed = (self->steps - self->closing_steps) + 1U;
+    return (elapsed > closed) ? (elapsed - closed) : 0U;
+}
+
+/* The frame's time of arrival says how far ahead of this node its sender can be; without a clock nothing is said. */
+static void look_at_clock(app *self, uint64_t at_us)
+{
+    if (self->options.lockstep || (!self->node->closed) || (at_us < self->closing_us)) {
+        return;
+    }
+    const uint64_t behind = samples_behind(self, at_us);
+    hg_node_expect(self->node, (behind > STAMPS_AHEAD) ? STAMPS_AHEAD : (uint32_t)behind);
+    if (behind > STAMPS_AHEAD) {
+        hg_node_outage(self->node);
+        self->outages++;
+    }
 }
 
 static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
 {
-    if (outage(self, at_us)) {
-        hg_node_outage(self->node);
-        self->outages++;
-    }
+    look_at_clock(self, at_us);
     hg_status status = hg_node_receive(self->node, frame);
     if (status == HG_E_BUSY) {
         make_steps(self);
@@ -377,7 +386,7 @@ static void print_status(app *self)
     (void)printf("k=%" PRIu32 " plant=%s candidates=0x%" PRIX32, self->verdict.k, plant[self->verdict.plant], self->verdict.candidates);
     for (uint8_t i = 0U; i < config->detector->groups; i++) {
         const hg_link_health *health = hg_node_health(self->node, i);
-        const unsigned refused = (unsigned)health->crc + health->format + health->repeated + health->early + health->late + health->numeric;
+        const unsigned refused = (unsigned)health->crc + health->format + health->repeated + health->early + health->late + health->sequence + health->untrusted + health->numeric;
         (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", self->options.model->group[i], bus[(self->verdict.bus >> (2U * i)) & 0x3U],
                      (unsigned)health->good, (unsigned)health->lost, refused);
     }

@@ -1,7 +1,5 @@
 #include "hullguard/frame.h"
 
-#include "hullguard/e2e.h"
-
 #include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
@@ -45,7 +43,7 @@ static bool field_valid(const hg_message *message, const hg_field *field)
     valid = valid && ((!is_float) || (field->length == FLOAT32_BITS));
     for (uint8_t i = 0U; valid && (i < field->length); i++) {
         const uint16_t bit = position(field, i);
-        valid = (bit >= (8U * HG_E2E_P22_HEADER)) && (bit < (8U * (uint16_t)message->length));
+        valid = (bit < (8U * (uint16_t)message->length)) && (!hg_e2e_owns(message->e2e, bit));
     }
     return valid;
 }
@@ -65,8 +63,8 @@ bool hg_frame_valid(const hg_message *message)
 {
     const bool fd = (message->flags & HG_CAN_FD) != 0U;
     const bool extended = (message->flags & HG_CAN_EXTENDED) != 0U;
-    bool valid = (message->data_id != NULL) && (message->length >= HG_E2E_P22_HEADER) && (message->width <= HG_GROUP_SIGNALS_MAX) &&
-                 (message->length <= (fd ? HG_E2E_P22_LENGTH : HG_CAN_CLASSIC_MAX)) && fd_length(message->length);
+    bool valid = hg_e2e_valid(message->e2e, message->length) && (message->width <= HG_GROUP_SIGNALS_MAX) &&
+                 (message->length <= (fd ? HG_CAN_DATA_MAX : HG_CAN_CLASSIC_MAX)) && fd_length(message->length);
     valid = valid && (message->id <= (extended ? HG_CAN_ID_EXTENDED : HG_CAN_ID_STANDARD));
     valid = valid && ((message->width == 0U) || ((message->field != NULL) && (message->scale != NULL)));
     for (uint8_t g = 0U; valid && (g < message->width); g++) {
@@ -128,6 +126,9 @@ void hg_frame_pack(const hg_message *message, const int32_t *code, hg_can_frame 
     frame->id = message->id;
     frame->flags = message->flags;
     frame->length = message->length;
+    if (message->idle != NULL) {
+        (void)memcpy(frame->data, message->idle, message->length);
+    }
     for (uint8_t g = 0U; g < message->width; g++) {
         const hg_field *field = &message->field[g];
         const uint32_t pattern = pattern_of(field, &message->scale[g], code[g]);

@@ -4,6 +4,8 @@
 
 #define COUNTER_MASK 0x0FU
 #define STAMP_MASK 0x0FU
+#define COUNTER_BIT 8U /* of the node's own frames */
+#define STAMP_BIT 12U
 #define STAMP_AHEAD_MAX 7U /* stamps beyond lie nearer in the past than in the future */
 #define VERDICT_LENGTH 8U
 #define VERDICT_LENGTH_WIDE 12U /* with room for candidates 31:16 */
@@ -20,39 +22,6 @@ static void raise32(uint32_t *counter)
     *counter += (*counter < UINT32_MAX) ? 1U : 0U;
 }
 
-/* ---- Sender ---- */
-
-hg_status hg_sender_start(hg_sender *self, const hg_sender_config *config, int32_t *codes)
-{
-    if ((self == NULL) || (config == NULL) || (codes == NULL) || (config->message == NULL) || (config->trigger == NULL)) {
-        return HG_E_ARGUMENT;
-    }
-    if ((!hg_frame_valid(config->message)) || (config->message->width != config->trigger->width)) {
-        return HG_E_CONFIG;
-    }
-    self->config = config;
-    self->code = &codes[config->trigger->width];
-    self->counter = 0U;
-    return hg_trigger_start(&self->trigger, config->trigger, codes);
-}
-
-hg_status hg_sender_step(hg_sender *self, uint32_t k, const hg_real *value, hg_can_frame *frame)
-{
-    const hg_message *message = self->config->message;
-    for (uint8_t g = 0U; g < message->width; g++) {
-        self->code[g] = hg_code_encode(&message->scale[g], value[g]);
-    }
-    hg_status status = hg_trigger_step(&self->trigger, self->code);
-    if (status == HG_OK) {
-        hg_frame_pack(message, self->code, frame);
-        status = hg_e2e_p22_protect(frame->data, frame->length, message->data_id, self->counter, (uint8_t)(k & STAMP_MASK));
-        self->counter = (self->counter + 1U) & COUNTER_MASK;
-    }
-    return status;
-}
-
-/* ---- Detector node ---- */
-
 static bool wide(const hg_message *verdict)
 {
     return verdict->length == VERDICT_LENGTH_WIDE;
@@ -68,6 +37,33 @@ static bool verdict_holds(const hg_message *verdict, const hg_decision_config *d
     return wide(verdict) || ((faults >> VERDICT_FAULTS) == 0U);
 }
 
+/* Does a message begin as frame.h draws the node's own? */
+static bool own_header(const hg_e2e_config *e2e)
+{
+    return (e2e->profile == HG_E2E_P22) && (e2e->crc == 0U) && (e2e->counter == COUNTER_BIT) && (e2e->stamp == STAMP_BIT);
+}
+
+/* A closing frame is the clock: without a counter a lost one would never show. */
+static bool has_counter(const hg_e2e_config *e2e)
+{
+    return (e2e->profile != HG_E2E_NONE) && ((e2e->ignore & HG_E2E_IGNORE_COUNTER) == 0U);
+}
+
+static bool stamped(const hg_e2e_config *e2e)
+{
+    return (e2e->stamp != HG_E2E_NO_STAMP) && ((e2e->ignore & HG_E2E_IGNORE_STAMP) == 0U);
+}
+
+/* Does a sender speak every interval_max samples, whatever its signals do? Its silence promises nothing, and its age tells of every loss. */
+static bool periodic(const hg_trigger_config *trigger)
+{
+    bool always = true;
+    for (uint8_t l = 0U; l < trigger->levels; l++) {
+        always = always && ((trigger->silence[l] + 1U) >= trigger->interval_max);
+    }
+    return always;
+}
+
 static bool config_valid(const hg_node_config *config)
 {
     bool valid = (config->detector != NULL) && (config->message != NULL) && (config->verdict != NULL) && (config->status != NULL) &&
@@ -76,11 +72,12 @@ static bool config_valid(const hg_node_config *config)
     valid = valid && ((config->verdict->length == VERDICT_LENGTH) || wide(config->verdict)) && (config->status->length == VERDICT_LENGTH);
     valid = valid && (config->verdict->width == 0U) && (config->status->width == 0U) && (config->detector->hold != NULL);
     valid = valid && (config->closing < config->detector->groups) && (config->detector->groups <= HG_GROUPS_MAX);
+    valid = valid && own_header(config->verdict->e2e) && own_header(config->status->e2e);
     for (uint8_t i = 0U; valid && (i < config->detector->groups); i++) {
         valid = hg_frame_valid(&config->message[i]) && (config->detector->hold[i].trigger != NULL) &&
                 (config->message[i].width == config->detector->hold[i].trigger->width);
     }
-    return valid;
+    return valid && has_counter(config->message[config->closing].e2e);
 }
 
 hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_node_memory *memory, hg_start how)
@@ -91,11 +88,12 @@ hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_no
     if (!config_valid(config)) {
         return HG_E_CONFIG;
     }
-    *self = (hg_node){.config = config, .link = memory->link, .closing = memory->closing};
+    *self = (hg_node){.config = config, .link = memory->link, .closing = memory->closing, .ahead_max = STAMP_AHEAD_MAX};
     self->synchronised = how == HG_START_REST;
     for (uint8_t i = 0U; i < config->detector->groups; i++) {
+        self->link[i] = (hg_link){.timed = false};
         hg_e2e_receiver_start(&self->link[i].receiver);
-        self->link[i].health = (hg_link_health){.good = 0U};
+        hg_e2e_machine_start(&self->link[i].machine);
     }
     const hg_status status = hg_detector_start(&self->detector, config->detector, &memory->detector, how);
     return ((status == HG_OK) && (!verdict_holds(config->verdict, &config->detector->decision))) ? HG_E_CONFIG : status;
@@ -120,27 +118,81 @@ static void count_refusal(hg_link_health *health, hg_status status)
         raise16(&health->crc, 1U);
     } else if (status == HG_E_REPEATED) {
         raise16(&health->repeated, 1U);
+    } else if (status == HG_E_SEQUENCE) {
+        raise16(&health->sequence, 1U);
+    } else if (status == HG_E_STATE) {
+        raise16(&health->untrusted, 1U);
     } else if (status == HG_E_NUMERIC) {
         raise16(&health->numeric, 1U);
     } else {
-        /* not refused */
+        /* not refused, or counted where the stamp was read */
     }
 }
 
-/* Format, protection and content of a frame that carries a group's identifier; counts what it refuses. */
-static hg_status admit(hg_node *self, uint8_t group, const hg_can_frame *frame, int32_t *code, hg_e2e_header *header)
+/* Samples that a frame is ahead of the open one, modulo 16 or the counter's turn: above STAMP_AHEAD_MAX it is behind. */
+static uint8_t ahead_of(const hg_node *self, uint8_t group, const hg_e2e_header *header)
 {
-    const hg_message *message = &self->config->message[group];
-    hg_link *link = &self->link[group];
-    hg_status status = HG_E_FORMAT;
-    if (hg_frame_matches(message, frame)) {
-        status = hg_e2e_p22_receive(&link->receiver, frame->data, frame->length, message->data_id, header);
-        if (status == HG_OK) {
-            raise16(&link->health.lost, header->lost);
-            status = hg_frame_unpack(message, frame, code);
-        }
+    const hg_e2e_config *e2e = self->config->message[group].e2e;
+    uint32_t ahead = 0U;
+    if (stamped(e2e)) {
+        ahead = (header->stamp - self->k) & STAMP_MASK;
+    } else if ((group == self->config->closing) && self->closed) {
+        /* One closing frame a sample: its counter is a stamp, too. */
+        const uint32_t modulus = hg_e2e_modulus(e2e);
+        const uint32_t frames = ((header->counter + modulus) - self->closing_counter) % modulus;
+        ahead = ((frames + modulus) - ((self->k - self->closing_k) % modulus)) % modulus;
+    } else {
+        /* whatever comes belongs to the open sample */
     }
-    count_refusal(&link->health, status);
+    return (uint8_t)ahead;
+}
+
+/* Frames of a group that can have been sent from its last good one to one of sample k, that one included. */
+static uint16_t step_max(const hg_node *self, uint8_t group, uint32_t k)
+{
+    const hg_link *link = &self->link[group];
+    const hg_trigger_config *trigger = self->config->detector->hold[group].trigger;
+    if ((!link->timed) || (!self->synchronised)) {
+        return HG_E2E_ANY_STEP;
+    }
+    uint32_t shortest = UINT8_MAX;
+    for (uint8_t l = 0U; l < trigger->levels; l++) {
+        shortest = (trigger->silence[l] < shortest) ? trigger->silence[l] : shortest;
+    }
+    const uint32_t passed = k - link->k;
+    uint32_t step = (passed <= (uint32_t)INT32_MAX) ? (passed / (shortest + 1U)) : 0U;
+    /* Without a stamp two frames of neighbouring samples may come within one. */
+    step += stamped(self->config->message[group].e2e) ? 0U : 1U;
+    return (step < HG_E2E_ANY_STEP) ? (uint16_t)step : HG_E2E_ANY_STEP;
+}
+
+/* Sample and sequence of a measurement frame whose checksum is good. One of another sample moves the counter only where it fits the sequence:
+ * a late frame has been received, an old one that is sent once more has nothing to say. */
+static hg_status admit_sample(hg_node *self, uint8_t group, const hg_e2e_header *header, hg_e2e_progress *progress)
+{
+    const hg_e2e_config *e2e = self->config->message[group].e2e;
+    hg_link *link = &self->link[group];
+    const uint8_t ahead = ahead_of(self, group, header);
+    const uint32_t k = (self->k + ahead) - ((ahead > STAMP_AHEAD_MAX) ? (STAMP_MASK + 1U) : 0U);
+    hg_e2e_receiver moved = link->receiver;
+    hg_status status = hg_e2e_sequence(e2e, &moved, header, step_max(self, group, k), progress);
+    if (status == HG_E_REPEATED) {
+        return status;
+    }
+    if ((ahead == 0U) || (status == HG_OK)) {
+        link->receiver = moved;
+        link->k = k;
+        link->timed = self->synchronised;
+    }
+    raise16(&link->health.lost, (status == HG_OK) ? progress->lost : 0U);
+    if (!self->synchronised) {
+        status = HG_E_STAMP; /* of a sample that nobody can name yet: no fault of the sender's, and not counted */
+    } else if (ahead != 0U) {
+        raise16((ahead > STAMP_AHEAD_MAX) ? &link->health.late : &link->health.early, 1U);
+        status = HG_E_STAMP;
+    } else {
+        /* of the open sample: the sequence decides */
+    }
     return status;
 }
 
@@ -161,6 +213,7 @@ static void forget_past(hg_node *self)
     for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
         hg_hold *hold = &self->detector.memory.hold[i];
         (void)hg_hold_start(hold, hold->config, hold->sent);
+        self->link[i].timed = false;
     }
     hg_detector_restart(&self->detector, HG_START_MOVING);
 }
@@ -168,72 +221,121 @@ static void forget_past(hg_node *self)
 /* Every sample has one closing frame: since the last one accepted, counter and sample index must have moved alike. */
 static bool in_step(const hg_node *self, const hg_e2e_header *header, uint8_t ahead)
 {
-    const uint8_t frames = (uint8_t)((header->counter - self->closing_counter) & COUNTER_MASK);
-    const uint8_t samples = (uint8_t)(((self->k + ahead) - self->closing_k) & COUNTER_MASK);
+    const uint32_t modulus = hg_e2e_modulus(self->config->message[self->config->closing].e2e);
+    const uint32_t frames = ((header->counter + modulus) - self->closing_counter) % modulus;
+    const uint32_t samples = ((self->k + ahead) - self->closing_k) % modulus;
     return (!self->closed) || (frames == samples);
+}
+
+/* Is a refused closing frame the next but a few after the refused one before it? Then it is this node that has lost the sample index. */
+static bool agrees(const hg_node *self, const hg_e2e_header *header)
+{
+    const hg_e2e_config *e2e = self->config->message[self->config->closing].e2e;
+    const uint32_t modulus = hg_e2e_modulus(e2e);
+    const uint32_t frames = ((header->counter + modulus) - self->slipped_counter) % modulus;
+    const uint32_t samples = ((uint32_t)header->stamp - self->slipped_stamp) & STAMP_MASK;
+    const bool paced = (!self->clocked) || (frames == (self->k - self->slipped_k));
+    return self->slipped && paced && (frames >= 1U) && (frames <= STAMP_AHEAD_MAX) && ((!stamped(e2e)) || (samples == frames));
+}
+
+static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint8_t ahead)
+{
+    hg_link_health *health = &self->link[self->config->closing].health;
+    hg_status status = HG_E_SEQUENCE;
+    self->slipped = true;
+    self->slipped_counter = header->counter;
+    self->slipped_stamp = header->stamp;
+    self->slipped_k = self->k;
+    if (ahead > STAMP_AHEAD_MAX) {
+        raise16(&health->late, 1U);
+        status = HG_E_STAMP;
+    } else if (ahead > self->ahead_max) {
+        raise16(&health->early, 1U);
+        status = HG_E_STAMP;
+    } else {
+        /* out of step */
+    }
+    return status;
 }
 
 /* The closing frame tells the time: steps become due. */
 static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_header *header)
 {
-    const uint8_t width = self->config->message[self->config->closing].width;
-    hg_link_health *health = &self->link[self->config->closing].health;
-    uint8_t ahead = (uint8_t)((header->stamp - self->k) & STAMP_MASK);
-    const bool anew = header->lost == HG_E2E_LOST;
-    if ((self->synchronised) && (ahead > STAMP_AHEAD_MAX) && (!self->slipped) && (!anew)) {
-        self->slipped = true;
-        raise16(&health->late, 1U);
-        return HG_E_STAMP;
-    }
-    if ((!self->synchronised) || (ahead > STAMP_AHEAD_MAX) || anew || (!in_step(self, header, ahead))) {
-        /* Late twice running, or a sender that began anew: this node has lost the sample index. Take the sender's. */
-        if (self->synchronised) {
-            forget_past(self);
+    const uint8_t closing = self->config->closing;
+    const hg_message *message = &self->config->message[closing];
+    hg_link *link = &self->link[closing];
+    uint8_t ahead = ahead_of(self, closing, header);
+    const bool known = self->synchronised && (ahead <= self->ahead_max) && in_step(self, header, ahead);
+    if (self->synchronised && (!known)) {
+        if (!agrees(self, header)) {
+            return refuse_closing(self, header, ahead);
         }
-        self->k += ahead;
+        forget_past(self);
+        hg_e2e_receiver_start(&link->receiver);
+    }
+    if (!known) {
+        self->k += stamped(message->e2e) ? ahead : 0U; /* the sender's sample */
         ahead = 0U;
     }
+    hg_e2e_progress progress = {.lost = 0U, .continues = false};
+    (void)hg_e2e_sequence(message->e2e, &link->receiver, header, HG_E2E_ANY_STEP, &progress); /* no repetition, and any step will do */
+    raise16(&link->health.lost, progress.lost);
     self->synchronised = true;
     self->slipped = false;
     self->closed = true;
     self->closing_counter = header->counter;
     self->closing_k = self->k + ahead;
-    for (uint8_t g = 0U; g < width; g++) {
+    for (uint8_t g = 0U; g < message->width; g++) {
         self->closing[g] = code[g];
     }
     self->held = true;
-    self->continues = header->lost == 0U;
+    self->continues = progress.continues;
     self->due = (uint8_t)(ahead + 1U);
-    count_good(health, code, width);
+    count_good(&link->health, code, message->width);
     return HG_OK;
 }
 
-static hg_status book(hg_node *self, uint8_t group, const int32_t *code, const hg_e2e_header *header)
+/* One frame alone: kind, length, checksum, and is it the last one once more? */
+static hg_status admit(const hg_node *self, uint8_t group, const hg_can_frame *frame, hg_e2e_header *header)
 {
-    hg_link_health *health = &self->link[group].health;
-    const uint8_t ahead = (uint8_t)((header->stamp - self->k) & STAMP_MASK);
-    if (!self->synchronised) {
-        return HG_E_STAMP; /* of a sample that nobody can name yet: no fault of the sender's, and not counted */
+    const hg_message *message = &self->config->message[group];
+    hg_status status = HG_E_FORMAT;
+    if (hg_frame_matches(message, frame)) {
+        status = hg_e2e_check(message->e2e, frame->data, frame->length, header);
     }
-    if (ahead != 0U) {
-        raise16((ahead > STAMP_AHEAD_MAX) ? &health->late : &health->early, 1U);
-        return HG_E_STAMP;
+    if ((status == HG_OK) && hg_e2e_repeated(message->e2e, &self->link[group].receiver, header)) {
+        status = HG_E_REPEATED;
     }
-    const hg_status status = hg_detector_receive(&self->detector, group, code, header->lost == 0U);
+    return status;
+}
+
+/* What a trusted frame of the open sample says. */
+static hg_status book(hg_node *self, uint8_t group, const hg_can_frame *frame, const hg_e2e_header *header, const hg_e2e_progress *progress)
+{
+    int32_t code[HG_GROUP_SIGNALS_MAX];
+    const hg_message *message = &self->config->message[group];
+    hg_status status = hg_frame_unpack(message, frame, code);
     if (status == HG_OK) {
-        count_good(health, code, self->config->message[group].width);
-    } else {
-        count_refusal(health, status);
-        /* A second good frame for one sample is no duplicate by its counter: what it said is lost, and the next frame continues it. */
-        (void)hg_detector_lose(&self->detector, group);
+        if (group == self->config->closing) {
+            status = close_sample(self, code, header);
+        } else {
+            const bool uncounted = (message->e2e->profile == HG_E2E_NONE) && periodic(self->config->detector->hold[group].trigger);
+            status = hg_detector_receive(&self->detector, group, code, progress->continues || uncounted);
+            if (status == HG_OK) {
+                count_good(&self->link[group].health, code, message->width);
+            } else {
+                /* A second good frame for one sample is no duplicate by its counter: what it said is lost, and the next frame continues it. */
+                (void)hg_detector_lose(&self->detector, group);
+            }
+        }
     }
     return status;
 }
 
 hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
 {
-    int32_t code[HG_GROUP_SIGNALS_MAX];
-    hg_e2e_header header = {.stamp = 0U, .lost = 0U};
+    hg_e2e_header header = {.stamp = 0U, .counter = 0U, .crc = 0U};
+    hg_e2e_progress progress = {.lost = 0U, .continues = false};
     const uint8_t group = group_of(self->config, frame);
     if (group >= self->config->detector->groups) {
         raise32(&self->unknown);
@@ -242,18 +344,36 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
     if (self->due > 0U) {
         return HG_E_BUSY;
     }
-    hg_status status = admit(self, group, frame, code, &header);
-    if (status == HG_OK) {
-        status = (group == self->config->closing) ? close_sample(self, code, &header) : book(self, group, code, &header);
+    const bool closing = group == self->config->closing;
+    const hg_e2e_config *e2e = self->config->message[group].e2e;
+    hg_link *link = &self->link[group];
+    hg_status status = admit(self, group, frame, &header);
+    if ((status == HG_OK) && (!closing)) {
+        status = admit_sample(self, group, &header, &progress);
     }
+    if (status != HG_E_FORMAT) { /* a twin of another kind or length says nothing of the frames that its sender sends */
+        (void)hg_e2e_machine_step(&link->machine, e2e->limits, status);
+    }
+    if (status == HG_OK) {
+        const bool trusted = closing || (link->machine.state != HG_E2E_INVALID) || ((e2e->ignore & HG_E2E_IGNORE_STATE) != 0U);
+        status = trusted ? book(self, group, frame, &header, &progress) : HG_E_STATE;
+    }
+    count_refusal(&link->health, status);
     if ((status != HG_OK) && (status != HG_E_REPEATED)) {
         (void)hg_detector_lose(&self->detector, group);
     }
     return status;
 }
 
+void hg_node_expect(hg_node *self, uint32_t samples)
+{
+    self->ahead_max = (samples < STAMP_AHEAD_MAX) ? (uint8_t)samples : STAMP_AHEAD_MAX;
+    self->clocked = true;
+}
+
 void hg_node_overdue(hg_node *self)
 {
+    self->clocked = true;
     if (self->due == 0U) {
         self->due = 1U;
     }
@@ -292,6 +412,18 @@ static bool refused(const hg_node *self)
     return any;
 }
 
+/* A sender speaks at least every interval_max samples: each time that passes without a frame is an event of its link. */
+static void look_at_deadlines(hg_node *self)
+{
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        const uint8_t age = hg_hold_age(&self->detector.memory.hold[i]);
+        const uint8_t interval = self->config->detector->hold[i].trigger->interval_max;
+        if ((age >= interval) && (age < UINT8_MAX) && ((age % interval) == 0U)) {
+            (void)hg_e2e_machine_step(&self->link[i].machine, self->config->message[i].e2e->limits, HG_E_EMPTY);
+        }
+    }
+}
+
 hg_status hg_node_step(hg_node *self, hg_verdict *verdict)
 {
     if (self->due == 0U) {
@@ -306,6 +438,7 @@ hg_status hg_node_step(hg_node *self, hg_verdict *verdict)
         raise32(&self->overdue);
     }
     (void)hg_detector_step(&self->detector, &finding); /* a refusal is in the verdict's refused flag */
+    look_at_deadlines(self);
     *verdict = (hg_verdict){.k = self->k,
                             .model_hash = self->config->model_hash,
                             .candidates = finding.candidates,
@@ -339,7 +472,7 @@ static void put_verdict(hg_node *self, const hg_verdict *verdict, bool reply, hg
         frame->data[8] = (uint8_t)((verdict->candidates >> 16U) & 0xFFU);
         frame->data[9] = (uint8_t)(verdict->candidates >> 24U);
     }
-    (void)hg_e2e_p22_protect(frame->data, frame->length, message->data_id, self->verdict_counter, (uint8_t)(verdict->k & STAMP_MASK));
+    (void)hg_e2e_protect(message->e2e, frame->data, frame->length, self->verdict_counter, (uint8_t)(verdict->k & STAMP_MASK));
     self->verdict_counter = (self->verdict_counter + 1U) & COUNTER_MASK;
 }
 
@@ -356,7 +489,7 @@ static void put_status(hg_node *self, const hg_verdict *verdict, hg_can_frame *f
     for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
         const hg_link_health *health = &self->link[i].health;
         lost += health->lost;
-        refusals += (uint32_t)health->crc + health->format + health->early + health->late + health->numeric;
+        refusals += (uint32_t)health->crc + health->format + health->early + health->late + health->sequence + health->untrusted + health->numeric;
     }
     *frame = blank(message);
     frame->data[2] = (uint8_t)(verdict->model_hash & 0xFFU);
@@ -365,7 +498,7 @@ static void put_status(hg_node *self, const hg_verdict *verdict, hg_can_frame *f
     frame->data[5] = (uint8_t)((verdict->model_hash >> 24U) & 0xFFU);
     frame->data[6] = clipped(lost);
     frame->data[7] = clipped(refusals);
-    (void)hg_e2e_p22_protect(frame->data, frame->length, message->data_id, self->status_counter, (uint8_t)(verdict->k & STAMP_MASK));
+    (void)hg_e2e_protect(message->e2e, frame->data, frame->length, self->status_counter, (uint8_t)(verdict->k & STAMP_MASK));
     self->status_counter = (self->status_counter + 1U) & COUNTER_MASK;
 }
 
@@ -395,13 +528,11 @@ uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_
 
 hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, hg_verdict *verdict, bool *reply)
 {
-    hg_e2e_receiver fresh;
     hg_e2e_header header;
     if ((!hg_frame_matches(message, frame)) || ((frame->length != VERDICT_LENGTH) && (!wide(message)))) {
         return HG_E_FORMAT;
     }
-    hg_e2e_receiver_start(&fresh);
-    const hg_status status = hg_e2e_p22_receive(&fresh, frame->data, frame->length, message->data_id, &header);
+    const hg_status status = hg_e2e_check(message->e2e, frame->data, frame->length, &header);
     if (status == HG_OK) {
         const uint8_t plant = frame->data[2] & 0x3U;
         const uint8_t basis = (frame->data[2] >> 2U) & 0x3U;
@@ -421,45 +552,4 @@ hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, 
 const hg_link_health *hg_node_health(const hg_node *self, uint8_t group)
 {
     return &self->link[group].health;
-}
-
-/* ---- From a receive interrupt to the main loop ---- */
-
-hg_status hg_inbox_start(hg_inbox *self, hg_can_frame *frame, uint8_t length)
-{
-    /* A power of two divides 256, so that the counters may wrap. */
-    if ((self == NULL) || (frame == NULL) || (length < 2U) || (length > 128U) || ((length & (uint8_t)(length - 1U)) != 0U)) {
-        return HG_E_ARGUMENT;
-    }
-    self->frame = frame;
-    self->length = length;
-    self->written = 0U;
-    self->read = 0U;
-    self->overflow = 0U;
-    return HG_OK;
-}
-
-hg_status hg_inbox_put(hg_inbox *self, const hg_can_frame *frame)
-{
-    const uint8_t written = self->written;
-    const uint8_t waiting = (uint8_t)(written - self->read);
-    if (waiting >= self->length) {
-        const uint16_t overflow = self->overflow;
-        self->overflow = (overflow < UINT16_MAX) ? (uint16_t)(overflow + 1U) : UINT16_MAX;
-        return HG_E_BUSY;
-    }
-    self->frame[written & (uint8_t)(self->length - 1U)] = *frame;
-    self->written = (uint8_t)(written + 1U);
-    return HG_OK;
-}
-
-hg_status hg_inbox_get(hg_inbox *self, hg_can_frame *frame)
-{
-    const uint8_t read = self->read;
-    if (self->written == read) {
-        return HG_E_EMPTY;
-    }
-    *frame = self->frame[read & (uint8_t)(self->length - 1U)];
-    self->read = (uint8_t)(read + 1U);
-    return HG_OK;
 }

@@ -87,6 +87,7 @@ def _drive(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--speed", default="max", metavar="X", help="max (default), or a multiple of real time; 1 is real time, with the node's timer, any other in lockstep")
     parser.add_argument("--out", metavar="DIR", help="write run.log, run.json, signals.csv, labels.csv, the DBC and report.html there")
+    parser.add_argument("--formats", metavar="F[,F..]", default="", help="with --out: the log as run.F too, F of pcap, pcapng, blf, mf4, asc")
     _expect(parser)
     _bus(parser)
 
@@ -124,16 +125,30 @@ def build_parser() -> argparse.ArgumentParser:
     _faults(p)
     _drive(p)
 
-    p = add("detect", "the detector on any python-can interface, or on a candump log")
+    p = add("detect", "the detector on any python-can interface, or on a recorded log")
     _common(p)
     _scenario(p)
-    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus")
+    p.add_argument("--log", metavar="FILE", help="recording instead of a bus: .log (candump -L), .pcap, .pcapng, .blf, .mf4 or .asc")
     p.add_argument("--lockstep", action="store_true", help="answer every closing frame with a verdict; no deadline")
     p.add_argument("--rest", action="store_true", help="the plant starts within its initial range (default: anywhere in its range)")
     p.add_argument("--listen", action="store_true", help="send nothing")
     p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
     p.add_argument("--ready", action="store_true", help="print 'ready' once the bus is open")
     _expect(p)
+    _bus(p)
+
+    p = add("monitor", "live view of a bus or a log: signals with radii, residuals, verdicts, senders, load, losses")
+    _common(p)
+    _scenario(p)
+    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus: played at its own speed in the view, at once as lines")
+    p.add_argument("--speed", metavar="X", help="max, or a multiple of the log's own speed")
+    p.add_argument("--plain", action="store_true", help="lines of key=value, also where stdout is no terminal; --json: a JSON object a line")
+    p.add_argument("--every", type=float, default=1.0, metavar="S", help="seconds between two such lines (default 1); a change has its own line at once")
+    p.add_argument("--rate", type=float, default=5.0, metavar="HZ", help="pictures a second (default 5)")
+    p.add_argument("--rest", action="store_true", help="the first frame is of a plant within its initial range (default: anywhere in its range)")
+    p.add_argument("--lockstep", action="store_true", help="the bus keeps no time: no deadline for the closing frame")
+    p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
+    p.add_argument("--snapshot", action="append", default=[], metavar="FILE", help="the last screen as FILE.svg or FILE.txt; may be given more than once")
     _bus(p)
 
     p = add("plant", "the emulated plant and its senders alone, on a bus with a node of your own")
@@ -181,6 +196,13 @@ def build_parser() -> argparse.ArgumentParser:
     inject.add_arguments(p, _seed)
     _output(p)
 
+    p = add("convert", "recordings of CAN frames from one format into another, by suffix: .log (candump -L), .pcap, .pcapng, .blf, .mf4, .asc")
+    p.add_argument("source", metavar="IN", help="recording to read")
+    p.add_argument("target", metavar="OUT", help="file to write; with --dbc it may be .csv: signals for PlotJuggler")
+    p.add_argument("--channel", metavar="NAME", help="only frames of this channel (default: all)")
+    p.add_argument("--dbc", metavar="FILE", help="what the frames mean, for a .csv")
+    _output(p)
+
     p = add("report", "draw report.html from the files of a run, or campaign.html from those of a campaign")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run or campaign")
     p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
@@ -191,6 +213,7 @@ def build_parser() -> argparse.ArgumentParser:
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
     from hullguard.inject.command import run_inject
+    from hullguard.monitor.command import run_monitor
 
     return {
         "design": commands.run_design,
@@ -198,9 +221,11 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "replay": commands.run_replay,
         "detect": commands.run_detect,
         "plant": commands.run_plant,
+        "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
         "inject": run_inject,
+        "convert": commands.run_convert,
         "report": commands.run_report,
     }
 

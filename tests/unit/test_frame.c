@@ -6,6 +6,7 @@
 #include "hullguard/frame.h"
 
 static const uint8_t ids[HG_E2E_IDS] = {0U};
+static const hg_e2e_config p22 = {.profile = HG_E2E_P22, .data_ids = ids, .crc = 0U, .counter = 8U, .stamp = 12U, .limits = &hg_e2e_limits_default};
 
 static hg_code_scale scale_of(double resolution, int32_t minimum, int32_t maximum)
 {
@@ -16,7 +17,7 @@ static hg_code_scale scale_of(double resolution, int32_t minimum, int32_t maximu
 /* A classic frame of 8 bytes with one field. */
 static hg_message message_of(const hg_field *field, const hg_code_scale *scale)
 {
-    return (hg_message){.id = 0x123U, .flags = 0U, .length = 8U, .width = 1U, .field = field, .scale = scale, .data_id = ids};
+    return (hg_message){.id = 0x123U, .flags = 0U, .length = 8U, .width = 1U, .field = field, .scale = scale, .e2e = &p22};
 }
 
 /* Every code that a field can carry beside its invalid pattern. */
@@ -170,7 +171,7 @@ static void an_integer_outside_the_scale_is_refused(void **state)
     (void)state;
     const hg_field fields[2] = {{16U, 8U, HG_FIELD_SIGNED}, {24U, 8U, HG_FIELD_SIGNED}};
     const hg_code_scale scales[2] = {scale_of(1.0, -10, 20), scale_of(1.0, -10, 20)};
-    const hg_message message = {.id = 1U, .length = 8U, .width = 2U, .field = fields, .scale = scales, .data_id = ids};
+    const hg_message message = {.id = 1U, .length = 8U, .width = 2U, .field = fields, .scale = scales, .e2e = &p22};
     for (int32_t a = -128; a < 128; a++) {
         hg_can_frame frame = {.id = 1U, .length = 8U};
         int32_t code[2];
@@ -257,7 +258,7 @@ static void messages_that_no_frame_can_carry_are_invalid(void **state)
     const hg_message usual = message_of(&good, &scale);
     hg_message m = usual;
     assert_true(hg_frame_valid(&m));
-    m = usual, m.data_id = NULL;
+    m = usual, m.e2e = NULL;
     assert_false(hg_frame_valid(&m));
     m = usual, m.width = (uint8_t)(HG_GROUP_SIGNALS_MAX + 1U);
     assert_false(hg_frame_valid(&m));
@@ -334,7 +335,7 @@ static void many_signals_share_a_long_frame(void **state)
     }
     const hg_message message = {
         .id = 0x12345U, .flags = HG_CAN_EXTENDED | HG_CAN_FD | HG_CAN_BRS, .length = 32U, .width = 30U, .field = fields,
-            .scale = scales, .data_id = ids};
+            .scale = scales, .e2e = &p22};
     assert_true(hg_frame_valid(&message));
     for (int i = 0; i < 1000; i++) {
         int32_t code[30];
@@ -366,7 +367,7 @@ static void a_frame_of_64_bytes_carries_signals_to_its_end(void **state)
         scales[j] = scale_of(1.0, -32767, 32767);
     }
     hg_message message = {.id = 0x123U, .flags = HG_CAN_FD | HG_CAN_BRS, .length = 64U, .width = 31U, .field = fields, .scale = scales,
-        .data_id = ids};
+        .e2e = &p22};
     assert_true(hg_frame_valid(&message));
     for (int i = 0; i < 200; i++) {
         int32_t code[31];

@@ -6,12 +6,17 @@
  *      on every frame:      hg_node_receive(&node, &frame)
  *      then, and overdue:   while (hg_node_step(&node, &verdict) == HG_OK) { send what hg_node_report() hands out }
  *
- *  Stamps. Every frame carries k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated as
- *  lost, never booked to the wrong sample. A closing frame j <= 7 ahead makes j steps without it first; a late one is counted, and two running
- *  restart the detector at the sender's sample with nothing known of any group; so does one whose counter has not moved with its sample,
- *  which is of a sender that began anew. The sample index never goes back. More than 7 closing frames lost in a row read as fewer, or as
- *  none: the application, which has a clock, must have called hg_node_overdue() for each, or call hg_node_outage(). Otherwise an alarm
- *  after such an outage may be false.
+ *  Stamps. The project's own frames carry k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated
+ *  as lost, never booked to the wrong sample. Its counter may have moved by as many frames as the sender can have sent since the last good one
+ *  and no further. A frame without a stamp, of a vehicle's own network, belongs to the sample that is open when it comes: its radii must allow
+ *  for that (the design's skew).
+ *  A closing frame j <= 7 ahead makes j steps without it first. One that is late, or whose counter has not moved with its sample, is refused;
+ *  two such running that agree with each other (and, where the application has a clock, with the samples it closed as overdue in between:
+ *  old frames sent once more come in a burst) are of a sender that began anew or of one this node has lost: the detector restarts at the
+ *  sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing frames lost in a row read as fewer,
+ *  or as none: the application, which has a clock, must have called hg_node_overdue() for each, or call hg_node_outage(). Otherwise an
+ *  alarm after such an outage may be false. Closing frames without a stamp are timed by their counter alike.
+ *  A link that has seen too many damaged frames is not trusted until good ones came (e2e.h, INVALID); closing frames are, they are the clock.
  *  Not reentrant per instance. hg_inbox is the one structure that an interrupt may share with the main loop. */
 #ifndef HULLGUARD_NODE_H
 #define HULLGUARD_NODE_H
@@ -55,8 +60,8 @@ typedef struct {                       /* flash: one a model, generated */
     const hg_detector_config *detector;
     const hg_message         *message;    /* [groups] */
     uint8_t                   closing;    /* the group whose frame closes the sample */
-    const hg_message         *verdict;    /* 8 bytes, or 12 for more than 16 faults; no fields: the map stands in frame.h */
-    const hg_message         *status;     /* 8 bytes, no fields */
+    const hg_message         *verdict;    /* 8 bytes, or 12 for more than 16 faults; no fields: the map stands in frame.h; P22 */
+    const hg_message         *status;     /* 8 bytes, no fields; P22 */
     uint16_t                  heartbeat;  /* samples between heartbeats, >= 1 */
     uint32_t                  model_hash;
 } hg_node_config;
@@ -69,12 +74,17 @@ typedef struct {            /* what happened on one group's link since the start
     uint16_t repeated;      /* duplicates */
     uint16_t early;         /* stamped ahead of the open sample */
     uint16_t late;          /* stamped behind it */
+    uint16_t sequence;      /* the counter jumped further than the time allows: old frames, a second sender, one that began anew */
+    uint16_t untrusted;     /* good, but too many before were not (HG_E2E_INVALID) */
     uint16_t numeric;       /* a value neither in range nor marked invalid */
     uint16_t invalid;       /* frames with a value marked invalid by its sender */
 } hg_link_health;
 
 typedef struct {            /* RAM: one a group */
     hg_e2e_receiver receiver;
+    hg_e2e_machine  machine;
+    uint32_t        k;      /* sample of the last frame whose checksum was good */
+    bool            timed;  /* is that sample known? */
     hg_link_health  health;
 } hg_link;
 
@@ -100,10 +110,15 @@ typedef struct {                /* RAM: one a node */
     bool            held;       /* closing[] waits for the last of them */
     bool            continues;  /* and its sequence counter continued */
     bool            synchronised; /* has a closing frame told which sample is open? */
-    bool            slipped;    /* the last closing frame was late */
+    bool            slipped;    /* the last closing frame was refused, late or out of step */
+    uint8_t         slipped_counter; /* its sequence counter */
+    uint8_t         slipped_stamp;   /* and its stamp */
+    uint32_t        slipped_k;  /* the sample that was open then */
+    bool            clocked;    /* the application has a clock: it has called hg_node_overdue() or hg_node_expect() */
     bool            closed;     /* has a closing frame been accepted? */
     uint8_t         closing_counter; /* the last accepted one's sequence counter */
     uint32_t        closing_k;  /* and its sample */
+    uint8_t         ahead_max;  /* samples that a closing frame can be ahead */
     bool            reported;   /* has a verdict frame been handed out? */
     uint16_t        silence;    /* samples since the last heartbeat */
     hg_verdict      last;       /* the last one of those */
@@ -131,9 +146,16 @@ hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_no
  *  @retval HG_E_CRC       damaged
  *  @retval HG_E_REPEATED  a duplicate, or a second frame of the group for the same sample (which then counts as lost)
  *  @retval HG_E_STAMP     of another sample
+ *  @retval HG_E_SEQUENCE  the counter jumped further than the time allows
+ *  @retval HG_E_STATE     good, but its link is not to be trusted yet
  *  @retval HG_E_NUMERIC   a value out of range
  *  @retval HG_E_BUSY      steps are due: make them first; nothing changed */
 hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame);
+
+/** The application's clock says that a closing frame received now cannot be further ahead of the open sample than this.
+ *  @param[in] samples  0 .. 7; more are taken as 7, which it is after the start. An old closing frame, sent once more, can look as if it were
+ *  up to 7 samples ahead: who has a clock and calls this before hg_node_receive() refuses it. */
+void hg_node_expect(hg_node *self, uint32_t samples);
 
 /** The open sample's closing frame has not come in time: the sample is closed without it. */
 void hg_node_overdue(hg_node *self);

@@ -18,7 +18,9 @@ typedef enum {
     HG_E_EMPTY      = -10, /* nothing to read or nothing to send */
     HG_E_BUSY       = -11, /* no room now; the same call may succeed later */
     HG_E_BUS        = -12, /* the bus is off or the interface is down */
-    HG_E_IO         = -13  /* the operating system or the controller refused; the backend's state says more */
+    HG_E_IO         = -13, /* the operating system or the controller refused; the backend's state says more */
+    HG_E_SEQUENCE   = -14, /* the sequence counter jumped further than the sender can have counted */
+    HG_E_STATE      = -15  /* a good frame of a link that has had too many bad ones to be trusted yet */
 } hg_status;
 
 #endif

@@ -14,6 +14,7 @@ import numpy as np
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
+from hullguard.design.protection import ProtectionTable
 from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, SignalTable, Tables
 from hullguard.design.zonotope_table import BALL, BOX, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
@@ -196,7 +197,7 @@ def _kind(g: GroupTable, closes: bool) -> str:
     """When a group's frame is sent."""
     if closes:
         return "closes the sample"
-    return "event" if g.interval_max > 1 else "periodic"
+    return "periodic" if g.periodic else "event"
 
 
 def _header(design: Design, names: Names) -> str:
@@ -286,7 +287,9 @@ def _group(g: GroupTable, n: str) -> list[str]:
         lines.append(f"static const hg_field {n}_field[] = {{")
         lines += [_field(s) for s in g.signals] + ["};", ""]
     shape = f"{g.levels}][{width}"
-    lines += table("uint8_t", f"{n}_data_id", "HG_E2E_IDS", [octets(g.message.data_id)], "data identifiers of profile 22 by counter value")
+    lines += _protection(g.message.protection, n)
+    if g.message.idle:
+        lines += table("uint8_t", f"{n}_idle", f"{g.message.length}", [octets(g.message.idle)], "what fills the frame where none of these signals lies")
     lines += table("uint8_t", f"{n}_silence", f"{g.levels}", [unsigned(g.silence)], "samples after a frame in which the sender does not speak, by level")
     lines += table("uint16_t", f"{n}_delta", shape, [unsigned(r) for r in g.delta], "relative threshold, 1/65536, by level and signal")
     lines += table("int32_t", f"{n}_sigma", shape, [signed(r) for r in g.sigma], "absolute threshold, codes, by level and signal")
@@ -301,11 +304,31 @@ def _group(g: GroupTable, n: str) -> list[str]:
     return lines
 
 
+def _protection(p: ProtectionTable, n: str) -> list[str]:
+    """The rules of one message: every check is on unless the model says otherwise."""
+    lines, ids = [], "NULL"
+    if p.data_ids:
+        lines += table("uint8_t", f"{n}_data_ids", "HG_E2E_IDS", [octets(p.data_ids)], "data identifiers by counter value")
+        ids = f"{n}_data_ids"
+    ignore = " | ".join(f"HG_E2E_IGNORE_{i.upper()}" for i in p.ignore) or "0U"
+    stamp = f"{p.stamp}U" if p.stamped else "HG_E2E_NO_STAMP"
+    return [
+        *lines,
+        *comment(f"{n}_e2e: protection, places in bits from the first of byte 0 on"),
+        f"static const hg_e2e_config {n}_e2e = {{",
+        f"    .profile = HG_E2E_{p.profile.upper()}, .mode = HG_E2E_{p.mode.upper()}, .data_id = 0x{p.data_id:04X}U, .data_ids = {ids},",
+        f"    .crc = {p.crc}U, .ignore = {ignore}, .counter = {p.counter}U, .nibble = {p.nibble}U, .stamp = {stamp}, .resync = 0U,",
+        "    .limits = &hg_e2e_limits_default,",
+        "};",
+        "",
+    ]
+
+
 def _message(m: MessageTable, n: str, width: int, indent: str = "    ") -> list[str]:
     field, scale = (f"{n}_field", f"{n}_scale") if width else ("NULL", "NULL")
     return [
         f"{indent}{{.id = 0x{m.id:X}UL, .flags = {flags(m.flags, CAN_FLAGS)}, .length = {m.length}U, .width = {width}U,",
-        f"{indent} .field = {field}, .scale = {scale}, .data_id = {n}_data_id}},",
+        f"{indent} .field = {field}, .scale = {scale}, .e2e = &{n}_e2e{f', .idle = {n}_idle' if m.idle else ''}}},",
     ]
 
 
@@ -557,7 +580,7 @@ def _node(design: Design) -> list[str]:
         "",
     ]
     for n, m in (("verdict", tables.verdict), ("status", tables.status)):
-        lines += table("uint8_t", f"{n}_data_id", "HG_E2E_IDS", [octets(m.data_id)], "data identifiers of profile 22 by counter value")
+        lines += _protection(m.protection, n)
         body = _message(m, n, 0, "")
         body[0] = f"static const hg_message {n} = {body[0]}"
         lines += [f"/* {n}: the detector's own frame; its byte map stands in frame.h */", body[0], "   " + body[1].removesuffix(",") + ";", ""]

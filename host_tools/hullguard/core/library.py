@@ -29,8 +29,10 @@ def _declarations(text: str) -> str:
             depth += {"{": 1, "}": -1}.get(text[at], 0)
             at += 1
     out.append(text[at:])
+    # cffi takes a constant object for a number; as a variable it can be pointed at.
+    declared = "".join(out).replace("extern const ", "extern ")
     # cffi evaluates array lengths and enumerators; it wants plain numbers there.
-    return re.sub(r"\b(\d+|0x[0-9A-Fa-f]+)[UuLl]+\b", r"\1", "".join(out))
+    return re.sub(r"\b(\d+|0x[0-9A-Fa-f]+)[UuLl]+\b", r"\1", declared)
 
 
 class Library:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.core.library import Library
+from hullguard.core.protect import protection
 from hullguard.core.zonotope import fill
 from hullguard.design.design import Design
 from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, Tables
@@ -89,7 +90,10 @@ class Native:
     def _message(self, m: Any, table: MessageTable, g: GroupTable | None) -> None:
         signals = g.signals if g else ()
         m.id, m.flags, m.length, m.width = table.id, table.flags, table.length, len(signals)
-        m.data_id = self._ints("uint8_t", table.data_id)
+        m.e2e, kept = protection(self.library, table.protection)
+        self._keep += kept
+        if table.idle:
+            m.idle = self._ints("uint8_t", table.idle)
         if g is None:
             return
         fields, scales = self._new("hg_field[]", len(signals) or 1), self._new("hg_code_scale[]", len(signals) or 1)
@@ -191,6 +195,11 @@ def frame_bits(library: Library, frame: Frame) -> int:
     return int(library.lib.hgh_frame_bits(frame_in(library, frame)))
 
 
+def data_bits(library: Library, frame: Frame) -> int:
+    """Of these, the ones at the data bit rate, exact: 0 unless an FD frame switches."""
+    return int(library.lib.hgh_frame_data_bits(frame_in(library, frame)))
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What a verdict frame says, or a node's record of it."""
@@ -244,6 +253,10 @@ class Node:
         """The closing frame has not come in time."""
         self._lib.hg_node_overdue(self.node)
 
+    def expect(self, samples: int) -> None:
+        """The clock says that the next closing frame is at most so many samples ahead of the open one, 0 .. 7."""
+        self._lib.hg_node_expect(self.node, samples)
+
     def outage(self) -> None:
         """More samples may have been missed than their stamps can tell."""
         self._lib.hg_node_outage(self.node)
@@ -285,7 +298,7 @@ class Node:
 
     def health(self) -> dict[str, int]:
         """Counters of all links together, by name, and of the node."""
-        total = dict.fromkeys(("good", "lost", "crc", "format", "repeated", "early", "late", "numeric", "invalid"), 0)
+        total = dict.fromkeys(("good", "lost", "crc", "format", "repeated", "early", "late", "sequence", "untrusted", "numeric", "invalid"), 0)
         for i in range(len(self.native.tables.groups)):
             link = self._lib.hg_node_health(self.node, i)
             for name in total:

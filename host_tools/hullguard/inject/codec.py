@@ -10,7 +10,7 @@ import struct
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cantools
 
@@ -19,58 +19,22 @@ from hullguard.codegen.dbc import emit_dbc
 from hullguard.codegen.names import names_of
 from hullguard.core.library import Library, library
 from hullguard.core.native import Frame
+from hullguard.core.protect import Protector
 from hullguard.design.design import Design
+from hullguard.design.protection import NONE, ProtectionTable
 from hullguard.errors import InputError
+from hullguard.model.network import protection
 
 FLOATS = {16: ("<e", 0x7E00), 32: ("<f", 0x7FC00000), 64: ("<d", 0x7FF8000000000000)}  # bits: format, quiet NaN
 KIND = EXTENDED | REMOTE | FD | ERROR
 
 
-@dataclass(frozen=True)
-class Header:
-    """What protection adds to a frame that is in order. stamp: sample index modulo 16, None where the frame has none."""
+class Protection(Protector):
+    """End-to-end protection of one message; `crc` is a byte of its checksum."""
 
-    counter: int
-    stamp: int | None
-
-
-class Protection(Protocol):
-    """End-to-end protection of one message."""
-
-    @property
-    def modulus(self) -> int:
-        """Values of the sequence counter."""
-
-    @property
-    def crc(self) -> int:
-        """A byte of the checksum."""
-
-    def protect(self, data: bytes, counter: int, stamp: int) -> bytes:
-        """The data with counter, stamp and checksum in place."""
-
-    def check(self, data: bytes) -> Header | None:
-        """The header; None: damaged."""
-
-
-class Profile22:
-    """Profile 22 by the C library (e2e.h)."""
-
-    modulus, crc = 16, 0
-
-    def __init__(self, library: Library, data_ids: bytes) -> None:
-        self._lib, self._ffi, self._ids = library.lib, library.ffi, data_ids
-
-    def protect(self, data: bytes, counter: int, stamp: int) -> bytes:
-        """The data with counter, stamp and checksum in place."""
-        made = self._ffi.new("uint8_t[]", data)
-        self._lib.hg_e2e_p22_protect(made, len(data), self._ids, counter % self.modulus, stamp & 15)
-        return bytes(self._ffi.buffer(made, len(data)))  # cffi puts a NUL behind bytes
-
-    def check(self, data: bytes) -> Header | None:
-        """The header; None: damaged."""
-        if len(data) < 2 or self._lib.hg_e2e_p22_crc(data, len(data), self._ids) != data[self.crc]:
-            return None
-        return Header(data[1] & 15, data[1] >> 4)
+    def __init__(self, library: Library, table: ProtectionTable) -> None:
+        super().__init__(library, table)
+        self.crc = table.crc
 
 
 @dataclass(frozen=True)
@@ -286,25 +250,6 @@ class Codec:
         return "good" if all(valued) else "invalid"
 
 
-def _protection(message: Any) -> Protection | None:
-    """What the attributes of a message in a DBC say of its protection."""
-    attributes = message.dbc.attributes if message.dbc is not None else {}
-    kind = attributes.get("E2EProfile")
-    chosen = kind.definition.choices[int(kind.value)] if kind is not None and isinstance(kind.value, int) else str(kind.value) if kind is not None else "None"
-    if chosen == "None":
-        return None
-    if chosen != "P22":
-        raise InputError(f"message '{message.name}': protection profile '{chosen}' is not known here; use P22 or None")
-    listed = attributes.get("E2EDataIdList")
-    try:
-        ids = bytes.fromhex(str(listed.value) if listed is not None else "")
-    except ValueError:
-        ids = b""
-    if len(ids) != 16:
-        raise InputError(f"message '{message.name}': E2EDataIdList must be 16 bytes in hexadecimal")
-    return Profile22(library(), ids)
-
-
 def _fields(message: Any) -> dict[str, Field]:
     made: dict[str, Field] = {}
     for s in sorted(message.signals, key=lambda s: s.multiplexer_signal is not None):
@@ -326,7 +271,8 @@ def codec_of(text: str, source: str, closing: str | None = None) -> Codec:
     layouts = []
     for m in database.messages:
         flags = (EXTENDED if m.is_extended_frame else 0) | (FD if m.is_fd else 0)
-        layouts.append(Layout(m.name, m.frame_id, flags, m.length, _fields(m), _protection(m)))
+        stated = protection(m)
+        layouts.append(Layout(m.name, m.frame_id, flags, m.length, _fields(m), Protection(library(), stated) if stated.profile != NONE else None))
     made = Codec(tuple(layouts), None, source)
     return replace(made, closing=made.message(closing)) if closing else made
 

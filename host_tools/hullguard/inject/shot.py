@@ -8,12 +8,13 @@ from random import Random
 from typing import ClassVar
 
 from hullguard.core.native import Frame
+from hullguard.core.protect import Header
 from hullguard.errors import InputError
-from hullguard.inject.codec import Codec, Field, Header, Layout
+from hullguard.inject.codec import Codec, Field, Layout
 from hullguard.inject.options import option
 
 STAMP_MODULUS = 16
-GONE = ("lost", "early", "overdue")  # what a receiver counts in consequence of a frame that it does not get or refuses; the last two, of closing frames
+GONE = ("lost", "early", "overdue", "untrusted")  # consequences of a frame that a receiver does not get or refuses; early and overdue: of closing ones
 COPY = "the changed frame goes out beside the original, which a tap can do, not in its place"
 
 

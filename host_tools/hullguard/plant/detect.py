@@ -33,6 +33,7 @@ class Detector:
         closing = frame.id == self._closing
         if closing and self._period is not None and self._closed_at is not None:
             missed = round((time_s - self._closed_at) / self._period) - 1 - self._steps_since
+            self.node.expect(min(max(missed, 0), STAMPS))
             if missed > STAMPS:
                 self.node.outage()
                 self.outages += 1
