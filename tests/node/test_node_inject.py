@@ -8,4 +8,4 @@ from node_support import run_inside
 
 
 def test_injection_on_vcan(tmp_path: Path) -> None:
-    run_inside("inject_inside.py", tmp_path, interfaces=2)
+    run_inside("inject_inside.py", out=tmp_path, interfaces=2)
