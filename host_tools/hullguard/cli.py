@@ -9,12 +9,15 @@ from typing import NoReturn
 
 from hullguard import __version__
 from hullguard.errors import HullguardError
+from hullguard.inject import arguments as inject
 
-EPILOG = """a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
+STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
+"""
+
+EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
   NAME a signal or a fault of the model; KIND bias, drift (units a second), gain, freeze or noise; START and END sample indices
 
-exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
-"""
+{STATUS}"""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -173,6 +176,11 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
 
+    p = add("inject", "faults on a bus, tapped or between two channels, or in a log")
+    p.epilog = f"{inject.SPEC}\n{STATUS}"
+    inject.add_arguments(p, _seed)
+    _output(p)
+
     p = add("report", "draw report.html from the files of a run, or campaign.html from those of a campaign")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run or campaign")
     p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
@@ -182,6 +190,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
+    from hullguard.inject.command import run_inject
 
     return {
         "design": commands.run_design,
@@ -191,6 +200,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "plant": commands.run_plant,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
+        "inject": run_inject,
         "report": commands.run_report,
     }
 
