@@ -53,22 +53,20 @@ class Protection(Protocol):
 class Profile22:
     """Profile 22 by the C library (e2e.h)."""
 
-    modulus, crc = 16, 0
+    crc = 0
 
     def __init__(self, library: Library, data_ids: bytes) -> None:
-        self._lib, self._ffi, self._ids = library.lib, library.ffi, data_ids
+        from hullguard.core.protect import Protector
+        from hullguard.design.protection import ProtectionTable
+        self._p = Protector(library, ProtectionTable("P22", 0, 8, 0, 12, "both", 0, tuple(data_ids), ()))
+        self.modulus = 16
 
     def protect(self, data: bytes, counter: int, stamp: int) -> bytes:
-        """The data with counter, stamp and checksum in place."""
-        made = self._ffi.new("uint8_t[]", data)
-        self._lib.hg_e2e_p22_protect(made, len(data), self._ids, counter % self.modulus, stamp & 15)
-        return bytes(self._ffi.buffer(made, len(data)))  # cffi puts a NUL behind bytes
+        return self._p.protect(data, counter, stamp)
 
     def check(self, data: bytes) -> Header | None:
-        """The header; None: damaged."""
-        if len(data) < 2 or self._lib.hg_e2e_p22_crc(data, len(data), self._ids) != data[self.crc]:
-            return None
-        return Header(data[1] & 15, data[1] >> 4)
+        h = self._p.check(data)
+        return None if h is None else Header(h.counter, h.stamp)
 
 
 @dataclass(frozen=True)
