@@ -224,7 +224,8 @@ static bool agrees(const hg_node *self, const hg_e2e_header *header)
     const uint32_t modulus = hg_e2e_modulus(e2e);
     const uint32_t frames = ((header->counter + modulus) - self->slipped_counter) % modulus;
     const uint32_t samples = ((uint32_t)header->stamp - self->slipped_stamp) & STAMP_MASK;
-    return self->slipped && (frames >= 1U) && (frames <= STAMP_AHEAD_MAX) && ((!stamped(e2e)) || (samples == frames));
+    const bool paced = (!self->clocked) || (frames == (self->k - self->slipped_k));
+    return self->slipped && paced && (frames >= 1U) && (frames <= STAMP_AHEAD_MAX) && ((!stamped(e2e)) || (samples == frames));
 }
 
 static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint8_t ahead)
@@ -234,6 +235,7 @@ static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint
     self->slipped = true;
     self->slipped_counter = header->counter;
     self->slipped_stamp = header->stamp;
+    self->slipped_k = self->k;
     if (ahead > STAMP_AHEAD_MAX) {
         raise16(&health->late, 1U);
         status = HG_E_STAMP;
@@ -352,10 +354,12 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
 void hg_node_expect(hg_node *self, uint32_t samples)
 {
     self->ahead_max = (samples < STAMP_AHEAD_MAX) ? (uint8_t)samples : STAMP_AHEAD_MAX;
+    self->clocked = true;
 }
 
 void hg_node_overdue(hg_node *self)
 {
+    self->clocked = true;
     if (self->due == 0U) {
         self->due = 1U;
     }
