@@ -181,7 +181,7 @@ class Injector:
         def send(frame: Frame, delay_s: float = 0.0, original: bool | Pending = False) -> Pending:
             """`original`: it is the frame itself that goes on its way, or the one that was held here."""
             origin = original if isinstance(original, Pending) else item
-            made = Pending(frame, beyond, bool(original) and origin.real, origin.index, told=original.told if isinstance(original, Pending) else "")
+            made = Pending(frame, beyond, bool(original) and origin.real, origin.index, told=original.told if isinstance(original, Pending) else told)
             made_here.append(made)
             if delay_s > 0.0:
                 return self._push(time_s + delay_s, made)
@@ -203,7 +203,7 @@ class Injector:
         else:
             left = stage.action.fire(shot) if fires else stage.action.passing(shot)
         for made in made_here:
-            made.told = told or made.told or item.told
+            made.told = made.told or told or item.told
         kept = [] if left is None else [Pending(left, beyond, item.real, item.index, told=item.told if left is item.frame else told or item.told)]
         return kept + further
 
