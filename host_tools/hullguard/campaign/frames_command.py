@@ -17,7 +17,7 @@ from rich.table import Table
 
 from hullguard.campaign.frames import Tally
 from hullguard.campaign.frames_all import CLASSES, HEAVY, FrameCase, all_cases, case_of
-from hullguard.campaign.frames_study import CHUNK, FramesJob, codec_for, failures, row, study
+from hullguard.campaign.frames_study import CHUNK, FramesJob, codec_for, failures, pooled, rows, study
 from hullguard.commands import emit, make_folder, prepared, progress, say, the_faults
 from hullguard.design.design import Design
 from hullguard.errors import ExpectationError, InputError
@@ -56,16 +56,20 @@ def run_frames(args: argparse.Namespace) -> int:
             tick("tasks", done, chunks)
 
         tallies = study(job, cases, args.runs, args.workers or os.cpu_count() or 1, more)
-    rows = [row(c, t, made) for c, t in zip(cases, tallies, strict=True)]
-    failed = failures(rows)
+    found = rows(cases, tallies, made)
+    failed, together = failures(found), pooled(found)
     result = {
-        "model": model.name, "scenario": scenario.name, "seed": args.seed, "samples": samples, "tampered_until": end, "runs": sum(r["runs"] for r in rows),
-        "frames": sum(r["frames"] for r in rows), "injected": sum(r["injected"] for r in rows), "faults": [str(f) for f in faults], "rows": rows, "failures": failed,
+        "model": model.name, "scenario": scenario.name, "seed": args.seed, "samples": samples, "tampered_until": end, "runs": sum(r["runs"] for r in found),
+        "frames": sum(r["frames"] for r in found), "injected": sum(r["injected"] for r in found), "faults": [str(f) for f in faults], "rows": found,
+        "damaged": together, "failures": failed,
     }  # fmt: skip
     if args.out:
         _write(Path(args.out), result, cases, tallies)
     if not args.quiet:
-        show(rows, sys.stderr if args.json else sys.stdout)
+        show(found, sys.stderr if args.json else sys.stdout)
+    if together["tried"]:
+        low, high = together["interval"]
+        say(args, f"of {together['tried']} heavily damaged frames {together['passed']} passed the checksum, expected {together['expected']:.1f} ({low} .. {high})")
     say(args, f"{result['injected']} faulty frames in {result['runs']} runs of {samples} samples, {time.monotonic() - began:.0f} s; frames are tampered with until sample {end}")
     emit(args, result)
     if failed:
