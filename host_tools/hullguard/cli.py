@@ -9,12 +9,15 @@ from typing import NoReturn
 
 from hullguard import __version__
 from hullguard.errors import HullguardError
+from hullguard.inject import arguments as inject
 
-EPILOG = """a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
+STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
+"""
+
+EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
   NAME a signal or a fault of the model; KIND bias, drift (units a second), gain, freeze or noise; START and END sample indices
 
-exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
-"""
+{STATUS}"""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -172,6 +175,7 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--limit", action="store_true", help="add the earliest detection that any sound detector could make, by linear programming, to each case")
     p.add_argument("--plants", type=_positive, default=0, metavar="M", help="emulate M plants drawn from the model's intervals in turn, half of them at corners")
     p.add_argument("--attack", type=float, default=0.0, metavar="SHARE", help="share of the runs whose disturbances are chosen against the detector, within the model's bounds")
+    p.add_argument("--inject", action="append", default=[], metavar="SPEC", help="faulty frames: a directive of `hullguard inject`, or all; every frame's counter is compared with the ledger")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
     p.add_argument("--scheduler", metavar="ADDRESS", help="work on a Dask cluster instead: its scheduler's tcp://HOST:PORT, or local; the results are the same")
     p.add_argument("--table", metavar="FILE", help="all runs as a table, a row each: FILE.parquet or FILE.csv")
@@ -195,6 +199,11 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--dbc", metavar="FILE", help="what the frames mean, for a .csv")
     _output(p)
 
+    p = add("inject", "faults on a bus, tapped or between two channels, or in a log")
+    p.epilog = f"{inject.SPEC}\n{STATUS}"
+    inject.add_arguments(p, _seed)
+    _output(p)
+
     p = add("report", "draw report.html from the files of a run, or campaign.html from those of a campaign")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run or campaign")
     p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
@@ -204,6 +213,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
+    from hullguard.inject.command import run_inject
     from hullguard.monitor.command import run_monitor
 
     return {
@@ -216,6 +226,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
         "convert": commands.run_convert,
+        "inject": run_inject,
         "report": commands.run_report,
     }
 

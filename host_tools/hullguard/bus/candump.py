@@ -86,6 +86,11 @@ def read(path: Path) -> Iterator[Entry]:
             yield _entry(raw, f"{path.name}:{number}")
 
 
+def frame_of(text: str, where: str) -> Frame:
+    """A frame without time and channel, such as 110#AABB; `where` names it in errors."""
+    return _entry(f"(0.0) - {text}", where).frame
+
+
 def _entry(raw: str, where: str) -> Entry:
     found = _LINE.match(raw)
     if not found:
