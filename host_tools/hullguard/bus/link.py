@@ -53,7 +53,8 @@ class CanLink:
 
     def __init__(self, bus: can.BusABC) -> None:
         self.bus = bus
-        self.channel = str(getattr(bus, "channel", "can0"))
+        channel = getattr(bus, "channel", "can0")
+        self.channel = channel if isinstance(channel, str) else bus.channel_info
         raw = getattr(bus, "socket", None)
         if isinstance(raw, socket.socket):
             for option in (socket.SO_RCVBUF, SO_RCVBUFFORCE) if sys.platform == "linux" else (socket.SO_RCVBUF,):

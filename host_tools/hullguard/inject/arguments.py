@@ -13,7 +13,7 @@ SPEC = """a directive SPEC is ACTION[:OPTION=VALUE,..][@TRIGGER=VALUE,..], for e
     from=T, to=T    seconds since the start (or time>=T, time<T); k=START[..END] sample indices, where a MODEL is given
     nth=N, every=N  the N-th frame of those, or each N-th; p=P with that probability; count=N at most so often
     at=T, period=T  not on a frame but at a moment, or every T seconds
-    name=NAME       in labels.csv, and of the directive's own random numbers
+    name=NAME       in labels.csv, and of the directive's own random numbers; seed=S of these, instead of --seed
 directives work one behind another, each on what those before it let through or send
 """
 

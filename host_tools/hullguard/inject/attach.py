@@ -23,12 +23,12 @@ class _Reader(threading.Thread):
 
     def __init__(self, link: CanLink, into: queue.Queue[tuple[CanLink, Frame | BusError]]) -> None:
         super().__init__(daemon=True)
-        self._link, self._into, self._stop = link, into, threading.Event()
+        self._link, self._into, self._ended = link, into, threading.Event()
 
     def run(self) -> None:
         """Until end()."""
         try:
-            while not self._stop.is_set():
+            while not self._ended.is_set():
                 got = self._link.receive(POLL_S)
                 if got is not None:
                     self._into.put((self._link, got[0]))
@@ -37,7 +37,7 @@ class _Reader(threading.Thread):
 
     def end(self) -> None:
         """Let the bus go, so that it can be closed."""
-        self._stop.set()
+        self._ended.set()
         self.join()
 
 

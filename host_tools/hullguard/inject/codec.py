@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,8 +15,11 @@ from typing import Any, Protocol
 import cantools
 
 from hullguard.bus.candump import ERROR, EXTENDED, FD, REMOTE
+from hullguard.codegen.dbc import emit_dbc
+from hullguard.codegen.names import names_of
 from hullguard.core.library import Library, library
 from hullguard.core.native import Frame
+from hullguard.design.design import Design
 from hullguard.errors import InputError
 
 FLOATS = {16: ("<e", 0x7E00), 32: ("<f", 0x7FC00000), 64: ("<d", 0x7FF8000000000000)}  # bits: format, quiet NaN
@@ -85,24 +87,27 @@ class Field:
     maximum: float | None
     choice: tuple[Field, tuple[int, ...]] | None = None  # a multiplexed signal's selector, and for which of its values it is there
 
-    def _places(self) -> Iterator[tuple[int, int]]:
-        """Bit of the field, least significant first, and bit of the frame. A Motorola field runs down its byte and on to the top of the next."""
+    @cached_property
+    def _places(self) -> tuple[tuple[int, int, int], ...]:
+        """Bit of the field, least significant first; byte and bit of the frame. A Motorola field runs down its byte and on to the top of the next."""
+        made = []
         for i in range(self.length):
             bit = self.start + i
             if self.motorola:
                 sent = self.start // 8 * 8 + 7 - self.start % 8 + self.length - 1 - i
                 bit = sent // 8 * 8 + 7 - sent % 8
-            yield i, bit
+            made.append((i, bit // 8, bit % 8))
+        return tuple(made)
 
     def raw(self, data: bytes) -> int:
         """The field's bits, without sign."""
-        return sum(1 << i for i, bit in self._places() if data[bit // 8] >> bit % 8 & 1)
+        return sum((data[byte] >> bit & 1) << i for i, byte, bit in self._places)
 
     def with_raw(self, data: bytes, raw: int) -> bytes:
         """The data with other bits in this field."""
         made = bytearray(data)
-        for i, bit in self._places():
-            made[bit // 8] = made[bit // 8] & ~(1 << bit % 8) | (raw >> i & 1) << bit % 8
+        for i, byte, bit in self._places:
+            made[byte] = made[byte] & ~(1 << bit) | (raw >> i & 1) << bit
         return bytes(made)
 
     @property
@@ -125,7 +130,7 @@ class Field:
     def _code(self, raw: int) -> int:
         return raw - (1 << self.length) if self.is_signed and raw >> (self.length - 1) else raw
 
-    @property
+    @cached_property
     def codes(self) -> tuple[int, int]:
         """Least and largest code, of the DBC's range as far as the field goes."""
         ones = (1 << (self.length - self.is_signed)) - 1
@@ -322,6 +327,11 @@ def codec_of(text: str, source: str, closing: str | None = None) -> Codec:
         layouts.append(Layout(m.name, m.frame_id, flags, m.length, _fields(m), _protection(m)))
     made = Codec(tuple(layouts), None, source)
     return replace(made, closing=made.message(closing)) if closing else made
+
+
+def design_codec(made: Design) -> Codec:
+    """The codec of a design, as its DBC has it, with the message that closes a sample."""
+    return codec_of(emit_dbc(made), made.model.name, names_of(made).groups[made.tables.closing])
 
 
 def read_codec(path: Path) -> Codec:

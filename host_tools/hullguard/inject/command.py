@@ -16,7 +16,7 @@ from hullguard.commands import bus_options, emit, make_folder, prepared, say, si
 from hullguard.errors import InputError
 from hullguard.inject.actions import ACTIONS
 from hullguard.inject.attach import attach, on_log, play
-from hullguard.inject.codec import Codec, codec_of, read_codec
+from hullguard.inject.codec import Codec, design_codec, read_codec
 from hullguard.inject.directive import Directive, parse_directive, read_directives
 from hullguard.inject.engine import Injector, Sent
 from hullguard.inject.labels import Ledger
@@ -47,7 +47,7 @@ def run_inject(args: argparse.Namespace) -> int:
         injector = Injector(directives, codec, args.seed, gateway, ledger)
         if args.log:
             for entry in on_log(injector, candump.read(Path(args.log))):
-                sink(Sent(entry.time_s, entry.frame))
+                sink(entry)
         else:
             _on_bus(args, injector, sides, sink)
     return _tell(args, injector, "log" if args.log else "gateway" if gateway else "tap")
@@ -78,27 +78,23 @@ def _codec(args: argparse.Namespace) -> Codec:
         if args.set:
             raise InputError("--set changes a model, and a DBC is none; name the model instead")
         return read_codec(Path(args.model))
-    from hullguard.codegen.dbc import emit_dbc
-    from hullguard.codegen.names import names_of
-
-    _, made = prepared(args)
-    return codec_of(emit_dbc(made), made.model.name, names_of(made).groups[made.tables.closing])
+    return design_codec(prepared(args)[1])
 
 
 @contextlib.contextmanager
-def _files(args: argparse.Namespace) -> Iterator[tuple[Ledger, Callable[[Sent], None]]]:
+def _files(args: argparse.Namespace) -> Iterator[tuple[Ledger, Callable[[candump.Entry], object]]]:
     """The ledger, and where what is sent gets written."""
     if not args.out:
-        yield Ledger(), lambda sent: None
+        yield Ledger(keep=False), lambda entry: None
         return
     out = Path(args.out)
     make_folder(out)
-    ledger, log = Ledger(out / "labels.csv"), candump.Writer(out / "injected.log", "vcan0")
+    ledger = Ledger(out / "labels.csv")
     try:
-        yield ledger, lambda sent: log.write(sent.time_s, sent.frame)
+        with (out / "injected.log").open("w", encoding="ascii") as log:
+            yield ledger, lambda entry: log.write(candump.line(entry.time_s, entry.channel, entry.frame) + "\n")
     finally:
         ledger.close()
-        log.close()
 
 
 def _until(args: argparse.Namespace, stopped: Callable[[], bool]) -> Callable[[], bool]:
@@ -106,7 +102,7 @@ def _until(args: argparse.Namespace, stopped: Callable[[], bool]) -> Callable[[]
     return lambda: stopped() or (end is not None and time.monotonic() >= end)
 
 
-def _on_bus(args: argparse.Namespace, injector: Injector, sides: list[dict[str, Any]], sink: Callable[[Sent], None]) -> None:
+def _on_bus(args: argparse.Namespace, injector: Injector, sides: list[dict[str, Any]], sink: Callable[[candump.Entry], object]) -> None:
     twins = any(d.action == "fdtwin" for d in injector.directives)
     if twins or any(x.flags & candump.FD for x in injector.traffic.codec.layouts):
         sides = [{"fd": True} | side for side in sides]
@@ -114,7 +110,11 @@ def _on_bus(args: argparse.Namespace, injector: Injector, sides: list[dict[str, 
         links = [stack.enter_context(opened(**side)) for side in sides]
         names = [str(side.get("channel")) for side in sides]
         say(args, f"gateway from {names[0]} to {names[1]}" if len(names) == 2 else f"tap on {names[0]}")
-        attach(injector, links[0], links[1] if len(links) == 2 else None, _until(args, stopped), sink, lambda: print("ready", flush=True) if args.ready else None)
+
+        def note(sent: Sent) -> None:
+            sink(candump.Entry(sent.time_s, names[-1], sent.frame))
+
+        attach(injector, links[0], links[1] if len(links) == 2 else None, _until(args, stopped), note, lambda: print("ready", flush=True) if args.ready else None)
 
 
 def _replay(args: argparse.Namespace, sides: list[dict[str, Any]]) -> int:

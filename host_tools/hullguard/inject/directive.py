@@ -1,16 +1,6 @@
 """Directives: which frames or moments (trigger), and what then happens (action). One line, or an entry of a YAML file.
 
-ACTION[:OPTION=VALUE,..][@TRIGGER=VALUE,..]        bias:signal=gap12_m,size=0.5@id=measurement,from=10,to=20
-
-trigger  id=ID[|ID..]     messages by name or number, a number with /MASK or x for extended (0x110, 0x100/0x7F0, 0x110x, measurement)
-         when="CONDITION" on the signals last seen: gap12_m > 1.0 and speed1_mps < 3
-         from=T, to=T     seconds since the start; time>=T and time<T say the same
-         k=K[..K]         sample indices, where the closing message is known; the end is not part of it
-         nth=N, every=N   the N-th of the frames that all of the above leave, or each N-th
-         at=T, period=T   not a frame but a moment, or one every T seconds from `from` to `to`
-         p=P              with probability P
-         count=N          at most N times
-         name=NAME        name in the ledger, and of the directive's own random numbers
+How both are written stands in arguments.SPEC, which --help prints. An entry has action, options, trigger and name, or is a one-line directive.
 """
 
 from __future__ import annotations
@@ -32,7 +22,8 @@ _TIME = re.compile(r"^time\s*(>=|>|<=|<)\s*(.+)$")
 _SAMPLES = re.compile(r"^(\d+)(\.\.(\d+)?)?$")
 _ID = re.compile(r"^(0[xX][0-9A-Fa-f]+|\d+)(?:/(0[xX][0-9A-Fa-f]+|\d+))?(x)?$")
 _SIGN = {">=": "from", ">": "from", "<": "to", "<=": "to"}
-TRIGGERS = ("id", "when", "from", "to", "k", "nth", "every", "at", "period", "p", "count", "name")
+TRIGGERS = ("id", "when", "from", "to", "k", "nth", "every", "at", "period", "p", "count", "name", "seed")
+SEED_MAX = 2**64 - 1
 STANDARD_MAX, EXTENDED_MAX = 0x7FF, 0x1FFFFFFF
 
 
@@ -82,6 +73,7 @@ class Directive:
     action: str
     options: Mapping[str, str] = field(default_factory=dict)
     trigger: Trigger = field(default_factory=Trigger)
+    seed: int | None = None  # instead of the injector's
     spec: str = ""
     where: str = ""
 
@@ -130,9 +122,9 @@ def _pairs(text: str, where: str) -> dict[str, str]:
     return made
 
 
-def parse_directive(spec: str) -> Directive:
-    """Read a one-line SPEC; raises InputError with what would do."""
-    where = f"directive '{spec}'"
+def parse_directive(spec: str, where: str = "") -> Directive:
+    """Read a one-line SPEC; raises InputError with `where` it stands, if that is known, and what would do."""
+    where = f"{where}: directive '{spec}'" if where else f"directive '{spec}'"
     head, tail = _halves(spec.strip())
     action, colon, options = head.partition(":")
     if not re.fullmatch(r"[a-z]+", action):
@@ -151,7 +143,8 @@ def _made(action: str, options: Mapping[str, str], trigger: Mapping[str, str], s
     if action not in ACTIONS:
         raise InputError(f"{where}: no action '{action}'; there are {', '.join(sorted(ACTIONS))}")
     fill(ACTIONS[action], options, where)
-    return Directive(trigger.get("name", ""), action, dict(options), _trigger(trigger, where), spec, where)
+    seed = int(number(trigger["seed"], int, 0, SEED_MAX, f"{where}: seed={trigger['seed']}")) if "seed" in trigger else None
+    return Directive(trigger.get("name", ""), action, dict(options), _trigger(trigger, where), seed, spec, where)
 
 
 def _id(text: str, where: str) -> IdMatch:
@@ -176,7 +169,7 @@ def _trigger(given: Mapping[str, str], where: str) -> Trigger:
 
     made = Trigger(
         ids=tuple(_id(x.strip(), where) for x in given["id"].split("|")) if "id" in given else (),
-        when=Predicate(given["when"]) if "when" in given else None,
+        when=_condition(given["when"], where) if "when" in given else None,
         start_s=of("from", float, 0.0) or 0.0,
         end_s=math.inf if "to" not in given else of("to", float, 0.0),
         nth=of("nth", int, 1) or 0,
@@ -196,6 +189,13 @@ def _trigger(given: Mapping[str, str], where: str) -> Trigger:
         return made
     first, last = _samples(given["k"], where)
     return replace(made, k_start=first, k_end=last)
+
+
+def _condition(text: str, where: str) -> Predicate:
+    try:
+        return Predicate(text)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def _samples(text: str, where: str) -> tuple[int, int | None]:
@@ -247,7 +247,7 @@ def read_directives(path: Path) -> list[Directive]:
 def _entry(node: yaml.Node, where: str) -> Directive:
     value = _plain(node, where)
     if isinstance(value, str):
-        return replace(parse_directive(value), where=where)
+        return parse_directive(value, where)
     if not isinstance(value, dict) or not isinstance(value.get("action"), str):
         raise InputError(f"{where}: expected a one-line directive, or a mapping with action, and if need be options, trigger, name")
     for key in value.keys() - {"action", "options", "trigger", "name"}:

@@ -38,7 +38,8 @@ class _Stage:
     def __init__(self, directive: Directive, traffic: Traffic, seed: int, gateway: bool) -> None:
         self.directive, self.trigger, self.traffic = directive, directive.trigger, traffic
         # Keyed by the name: another directive, before or behind, moves none of these numbers.
-        self.random = Random(f"{seed}/{directive.name}")
+        self.seed = seed if directive.seed is None else directive.seed
+        self.random = Random(f"{self.seed}/{directive.name}")
         self.action: Action = fill(ACTIONS[directive.action], directive.options, directive.where)
         reason = self.action.gateway_only()
         if reason and not gateway:
@@ -56,7 +57,7 @@ class _Stage:
             about = self.action.prepare(codec)
             named = [(codec.message(i.text) if i.id is None else None, i) for i in t.ids]
             for name in t.when.names if t.when else ():
-                codec.signal(name)
+                self.traffic.watched[name] = codec.signal(name)
         except InputError as error:
             raise InputError(f"{d.where}: {error}") from error
         if t.k_start is not None and codec.closing is None:
@@ -211,4 +212,4 @@ class Injector:
         d = stage.directive
         original = text(item.frame) if item.frame is not None else ""
         k = self.traffic.k if self.traffic.codec.closing is not None else None
-        self.ledger.add(Label(time_s, k, d.name, d.action, item.index, original, " ".join(text(f) for f in sent), expects, detail, self.seed))
+        self.ledger.add(Label(time_s, k, d.name, d.action, item.index, original, " ".join(text(f) for f in sent), expects, detail, stage.seed))

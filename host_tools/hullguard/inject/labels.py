@@ -35,8 +35,10 @@ class Label:
 class Ledger:
     """Rows in memory, or in a file as they come."""
 
-    def __init__(self, path: Path | None = None) -> None:
+    def __init__(self, path: Path | None = None, keep: bool = True) -> None:
+        """Without a path rows stay in memory, unless `keep` says that counts are enough."""
         self.rows: list[Label] = []
+        self._keep = keep
         self.events: Counter[str] = Counter()  # by directive
         self.actions: Counter[str] = Counter()
         self.expects: Counter[str] = Counter()
@@ -53,7 +55,7 @@ class Ledger:
         if self._writer:
             time_s, *rest = astuple(label)
             self._writer.writerow([f"{time_s:.6f}", *("" if x is None else x for x in rest)])
-        else:
+        elif self._keep:
             self.rows.append(label)
 
     def close(self) -> None:

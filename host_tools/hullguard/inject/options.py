@@ -69,7 +69,7 @@ def number(text: str, hint: type[int] | type[float], low: float | None, high: fl
         value = int(text, 0) if hint is int else float(text)
     except ValueError:
         value = math.nan
-    inside = math.isfinite(value) and (low is None or value >= low) and (high is None or value <= high) and (above is None or value > above)
+    inside = (isinstance(value, int) or math.isfinite(value)) and (low is None or value >= low) and (high is None or value <= high) and (above is None or value > above)
     if not inside:
         limits = [f"at least {low:g}" if low is not None else "", f"above {above:g}" if above is not None else "", f"at most {high:g}" if high is not None else ""]
         raise InputError(f"{where}: expected a {'whole ' if hint is int else ''}number {' and '.join(x for x in limits if x)}".rstrip())

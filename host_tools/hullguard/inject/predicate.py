@@ -10,6 +10,7 @@ from typing import Any
 
 from hullguard.errors import InputError
 
+LENGTH_MAX = 400  # also what keeps a tree from being deeper than the interpreter's stack
 _COMPARE: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
 }  # fmt: skip
@@ -21,6 +22,8 @@ class Predicate:
 
     def __init__(self, text: str) -> None:
         self.text = text
+        if len(text) > LENGTH_MAX:
+            raise InputError(f"condition '{text[:40]}..': {len(text)} characters, more than {LENGTH_MAX}; use several directives")
         try:
             self._tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError) as error:

@@ -13,6 +13,7 @@ from hullguard.inject.codec import Codec, Field, Header, Layout
 from hullguard.inject.options import option
 
 STAMP_MODULUS = 16
+GONE = ("lost", "early", "overdue")  # what a receiver counts in consequence of a frame that it does not get or refuses; the last two, of closing frames
 COPY = "the changed frame goes out beside the original, which a tap can do, not in its place"
 
 
@@ -24,7 +25,8 @@ class Traffic:
     frames: int = 0
     k: int = 0  # closing frames so far: the sample that is open
     stamp: int = 0  # of the open sample, where a header has told one
-    values: dict[str, float] = field(default_factory=dict)  # by SIGNAL and MESSAGE.SIGNAL
+    watched: dict[str, tuple[Layout, Field]] = field(default_factory=dict)  # what conditions look at, as they call it
+    values: dict[str, float] = field(default_factory=dict)  # of these
     last: dict[str, Frame] = field(default_factory=dict)  # by message
     headers: dict[str, Header] = field(default_factory=dict)
 
@@ -36,9 +38,9 @@ class Traffic:
         if layout is None or (layout.protection is not None and header is None):
             return False
         self.last[layout.name] = frame
-        for name, f in layout.fields.items():
-            if f.present(frame.data):
-                self.values[name] = self.values[f"{layout.name}.{name}"] = f.value(frame.data)
+        for name, (owner, f) in self.watched.items():
+            if owner is layout and f.present(frame.data):
+                self.values[name] = f.value(frame.data)
         closes = self.codec.closing is layout
         if header is not None:
             self.headers[layout.name] = header

@@ -8,7 +8,7 @@ from typing import ClassVar
 from hullguard.bus.candump import FD
 from hullguard.core.native import Frame
 from hullguard.inject.options import option, required
-from hullguard.inject.shot import Action, Change, Shot
+from hullguard.inject.shot import GONE, Action, Change, Shot
 
 CLASSIC_MAX, FD_MAX = 8, 64
 
@@ -20,7 +20,7 @@ class Corrupt(Change):
     about: ClassVar[str] = "flip bits of the data; with repair, of what the checksum guards, and renew the checksum"
     example: ClassVar[str] = "corrupt:bits=3@id=0x110,p=0.1,from=5,to=10"
     expects: ClassVar[tuple[str, ...]] = ("crc", "good", "invalid", "numeric")
-    also: ClassVar[tuple[str, ...]] = ("lost",)
+    also: ClassVar[tuple[str, ...]] = GONE
 
     bits: int = option(1, "how many, chosen by chance", low=1, high=8 * FD_MAX)
     byte: int | None = option(None, "only in this byte, counted from 0", low=0, high=FD_MAX - 1)
@@ -53,7 +53,7 @@ class Length(Change):
     about: ClassVar[str] = "cut the data off or lengthen them; CAN FD lengths that its length code cannot say, such as 13, go out on SocketCAN only"
     example: ClassVar[str] = "length:to=6@id=measurement,nth=20"
     expects: ClassVar[tuple[str, ...]] = ("format",)
-    also: ClassVar[tuple[str, ...]] = ("lost",)
+    also: ClassVar[tuple[str, ...]] = GONE
 
     to: int = required("bytes; a classic frame has 8 at most", low=0, high=FD_MAX)
     fill: int = option(0, "value of the bytes added", low=0, high=255)

@@ -11,8 +11,9 @@ from hullguard.core.native import Frame
 from hullguard.errors import InputError
 from hullguard.inject.codec import Codec, Field, Header, Layout
 from hullguard.inject.options import option
-from hullguard.inject.shot import COPY, Action, Change, Shot, assignments
+from hullguard.inject.shot import COPY, GONE, Action, Change, Shot, assignments
 
+FLOOD_MAX = 1_000_000
 HISTORY = 4096  # frames that replay can look back on
 CLASSIC_MAX, STANDARD_MAX, EXTENDED_MAX = 8, 0x7FF, 0x1FFFFFFF
 
@@ -23,8 +24,8 @@ class Replay(Action):
 
     about: ClassVar[str] = "send again what passed a while ago, as it was"
     example: ClassVar[str] = "replay:frames=5,age=1.0@id=measurement,at=10"
-    expects: ClassVar[tuple[str, ...]] = ("late", "repeated", "sequence", "good")
-    also: ClassVar[tuple[str, ...]] = ("lost",)
+    expects: ClassVar[tuple[str, ...]] = ("late", "early", "repeated", "sequence", "good")
+    also: ClassVar[tuple[str, ...]] = (*GONE, "late")
     frames: int = option(1, "how many", low=1, high=HISTORY)
     age: float = option(0.0, "seconds ago that the last of them passed, at least", low=0.0)
     spacing: str = option("kept", "kept: as they came; burst: at once", choices=("kept", "burst"))
@@ -57,7 +58,7 @@ class Spoof(Action):
     about: ClassVar[str] = "a frame of one's own, counted and stamped as the sender's next one; without `set`, with the values it last had"
     example: ClassVar[str] = "spoof:message=measurement,set=gap12_m=1.5;speed1_mps=0@at=10"
     expects: ClassVar[tuple[str, ...]] = ("good", "repeated", "crc", "unknown", "format")
-    also: ClassVar[tuple[str, ...]] = ("lost", "sequence")
+    also: ClassVar[tuple[str, ...]] = (*GONE, "late", "sequence")
     message: str | None = option(None, "message to forge (default: that of the frame which sets it off)")
     frame: str | None = option(None, "instead of a message: a whole frame as candump writes it, 123#DEADBEEF")
     set: str = option("", "SIGNAL=VALUE;.. in units of the signals")
@@ -107,7 +108,7 @@ class Spoof(Action):
             stamp = shot.traffic.stamp if self.stamp is None else self.stamp
             data = layout.protection.protect(data, self._count(shot, layout) % layout.protection.modulus, stamp)
             data = data if self.valid else layout.damaged(data)
-        return Frame(layout.id, layout.flags, data)
+        return Frame(layout.id, layout.flags if last is None else last.flags, data)
 
     def _count(self, shot: Shot, layout: Layout) -> int:
         """The counter behind the sender's last one and this one's own since."""
@@ -182,7 +183,7 @@ class Flood(Action):
     about: ClassVar[str] = "many frames with one identifier; on a real bus 0 wins every arbitration"
     example: ClassVar[str] = "flood:id=0x000,rate=2000,lasts=0.5@at=10"
     expects: ClassVar[tuple[str, ...]] = ("unknown", "crc", "format", "good")
-    also: ClassVar[tuple[str, ...]] = ("lost", "late", "repeated", "sequence")
+    also: ClassVar[tuple[str, ...]] = (*GONE, "late", "repeated", "sequence")
     id: int = option(0, "identifier", low=0, high=EXTENDED_MAX)
     rate: float = option(1000.0, "frames a second", above=0.0, high=1e5)
     lasts: float = option(0.1, "seconds", above=0.0, high=3600.0)
@@ -192,6 +193,12 @@ class Flood(Action):
     def at_moments(self) -> bool:
         """It needs no frame."""
         return True
+
+    def prepare(self, codec: Codec) -> tuple[Layout, ...]:
+        """All frames of a flood are made at once."""
+        if self.rate * self.lasts > FLOOD_MAX:
+            raise InputError(f"{self.rate * self.lasts:.0f} frames at once are more than {FLOOD_MAX}; take a shorter flood and repeat it with period=")
+        return ()
 
     def fire(self, shot: Shot) -> Frame | None:
         """All of them, one after another."""

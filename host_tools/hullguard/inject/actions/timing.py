@@ -9,10 +9,11 @@ from typing import ClassVar
 from hullguard.bus.candump import ERROR
 from hullguard.core.native import Frame
 from hullguard.inject.options import option
-from hullguard.inject.shot import Action, Pending, Shot
+from hullguard.inject.shot import GONE, Action, Pending, Shot
 
 LASTS = "seconds"
 LOST = ("lost",)
+MOVED = (*GONE, "sequence")
 BUS_OFF = Frame(0x040, ERROR, bytes(8))
 RESTARTED = Frame(0x100, ERROR, bytes(8))
 
@@ -25,6 +26,7 @@ class Drop(Action):
     example: ClassVar[str] = "drop@id=measurement,nth=5"
     needs_gateway: ClassVar[str] = "keep a frame from arriving"
     expects: ClassVar[tuple[str, ...]] = LOST
+    also: ClassVar[tuple[str, ...]] = GONE
 
     def fire(self, shot: Shot) -> Frame | None:
         """Gone."""
@@ -40,7 +42,7 @@ class Silence(Action):
     example: ClassVar[str] = "silence:lasts=0.5@id=measurement,at=10"
     needs_gateway: ClassVar[str] = "keep a frame from arriving"
     expects: ClassVar[tuple[str, ...]] = LOST
-    also: ClassVar[tuple[str, ...]] = ("overdue",)
+    also: ClassVar[tuple[str, ...]] = GONE
     lasts: float = option(1.0, LASTS, above=0.0)
     until_s: float = field(default=-math.inf, init=False)
 
@@ -68,7 +70,7 @@ class BusOff(Silence):
     about: ClassVar[str] = "an error frame says bus-off, the sender is silent for a while, an error frame says restarted"
     example: ClassVar[str] = "busoff:lasts=0.3@at=10"
     needs_gateway: ClassVar[str] = "silence a sender (error:kind=busoff sends the error frame alone)"
-    also: ClassVar[tuple[str, ...]] = ("overdue", "unknown")
+    also: ClassVar[tuple[str, ...]] = (*GONE, "unknown")
 
     def fire(self, shot: Shot) -> Frame | None:
         """Off; a second time while it is off changes nothing."""
@@ -88,7 +90,7 @@ class Delay(Action):
     example: ClassVar[str] = "delay:by=0.15,jitter=0.05@id=measurement,p=0.2"
     needs_gateway: ClassVar[str] = "hold a frame back"
     expects: ClassVar[tuple[str, ...]] = ("late", "good")
-    also: ClassVar[tuple[str, ...]] = ("lost", "sequence", "overdue")
+    also: ClassVar[tuple[str, ...]] = MOVED
     by: float = option(0.1, "seconds", low=0.0)
     jitter: float = option(0.0, "seconds more at most", low=0.0)
 
@@ -110,7 +112,7 @@ class Reorder(Action):
     example: ClassVar[str] = "reorder@id=measurement|control,p=0.1"
     needs_gateway: ClassVar[str] = "hold a frame back"
     expects: ClassVar[tuple[str, ...]] = ("late", "good")
-    also: ClassVar[tuple[str, ...]] = ("lost", "sequence", "overdue")
+    also: ClassVar[tuple[str, ...]] = MOVED
     behind: int = option(1, "how many pass it", low=1)
     patience: float = option(1.0, "seconds that it waits at most", above=0.0)
     _held: Pending | None = field(default=None, init=False)
@@ -141,7 +143,7 @@ class Duplicate(Action):
     about: ClassVar[str] = "the frame once more, or several times"
     example: ClassVar[str] = "duplicate@id=measurement,p=0.1"
     expects: ClassVar[tuple[str, ...]] = ("repeated",)
-    also: ClassVar[tuple[str, ...]] = ("late", "lost", "sequence")
+    also: ClassVar[tuple[str, ...]] = ("late", *MOVED)
     times: int = option(1, "copies", low=1, high=1000)
     gap: float = option(0.0, "seconds between them", low=0.0)
 

@@ -10,7 +10,7 @@ from hullguard.core.native import Frame
 from hullguard.errors import InputError
 from hullguard.inject.codec import Codec, Field, Layout
 from hullguard.inject.options import option, required
-from hullguard.inject.shot import Change, Shot
+from hullguard.inject.shot import GONE, Change, Shot
 
 SIGNAL = "the signal, by its name in the DBC, or MESSAGE.SIGNAL"
 SIZE = "in units of the signal"
@@ -20,7 +20,8 @@ SIZE = "in units of the signal"
 class Value(Change):
     """An action on one signal."""
 
-    expects: ClassVar[tuple[str, ...]] = ("good", "numeric")
+    expects: ClassVar[tuple[str, ...]] = ("good", "numeric", "crc")  # crc: of a frame that was damaged before
+    also: ClassVar[tuple[str, ...]] = GONE
 
     signal: str = required(SIGNAL)
     clip: bool = option(True, "values beyond the DBC's range become its end, as in a converter; false: they go out as far as the field holds them")
@@ -129,7 +130,7 @@ class Freeze(Value):
     """Stuck value."""
 
     about: ClassVar[str] = "the value before the first frame concerned, for ever"
-    example: ClassVar[str] = "freeze:signal=gap23_m@from=10,to=15"
+    example: ClassVar[str] = "freeze:signal=gap12_m@from=10,to=15"
     _before: float = field(default=math.nan, init=False)
 
     def value(self, old: float, shot: Shot) -> float:
@@ -150,8 +151,7 @@ class Nan(Value):
 
     about: ClassVar[str] = "no value, or one that cannot be"
     example: ClassVar[str] = "nan:signal=gap12_m,pattern=range@id=measurement,every=10"
-    expects: ClassVar[tuple[str, ...]] = ("invalid", "numeric")
-    also: ClassVar[tuple[str, ...]] = ("lost",)
+    expects: ClassVar[tuple[str, ...]] = ("invalid", "numeric", "crc")
     pattern: str = option(
         "invalid",
         "invalid: the pattern for no value (all ones, the most negative number, or a quiet NaN); range: a code beyond the range, or infinity in a float",
