@@ -175,7 +175,7 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--limit", action="store_true", help="add the earliest detection that any sound detector could make, by linear programming, to each case")
     p.add_argument("--plants", type=_positive, default=0, metavar="M", help="emulate M plants drawn from the model's intervals in turn, half of them at corners")
     p.add_argument("--attack", type=float, default=0.0, metavar="SHARE", help="share of the runs whose disturbances are chosen against the detector, within the model's bounds")
-    p.add_argument("--inject", action="append", default=[], metavar="SPEC", help="faulty frames: a directive of `hullguard inject`, or all; every frame's counter is compared with the ledger")
+    p.add_argument("--inject", action="append", default=[], metavar="SPEC", help="faulty frames: a directive of `inject`, or all; every counter is compared with the ledger")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
     p.add_argument("--scheduler", metavar="ADDRESS", help="work on a Dask cluster instead: its scheduler's tcp://HOST:PORT, or local; the results are the same")
     p.add_argument("--table", metavar="FILE", help="all runs as a table, a row each: FILE.parquet or FILE.csv")

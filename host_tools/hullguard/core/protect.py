@@ -41,7 +41,7 @@ class Protector:
 
     def __init__(self, library: Library, table: ProtectionTable) -> None:
         self._ffi, self._lib = library.ffi, library.lib
-        self._stamped = table.stamped
+        self.table = table
         self._config, self._keep = protection(library, table)
         self._blind, self._kept = protection(library, replace(table, ignore=("crc",)))
         self.modulus = int(self._lib.hg_e2e_modulus(self._config))
@@ -64,4 +64,4 @@ class Protector:
         header = self._ffi.new("hg_e2e_header *")
         if self._lib.hg_e2e_check(self._config, data or b"\0", len(data), header) != self._lib.HG_OK:
             return None
-        return Header(int(header.counter), int(header.stamp) if self._stamped else None)
+        return Header(int(header.counter), int(header.stamp) if self.table.stamped else None)

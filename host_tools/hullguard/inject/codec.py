@@ -10,65 +10,23 @@ import struct
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cantools
 
 from hullguard.bus.candump import ERROR, EXTENDED, FD, REMOTE
 from hullguard.codegen.dbc import emit_dbc
 from hullguard.codegen.names import names_of
-from hullguard.core.library import Library, library
+from hullguard.core.library import library
 from hullguard.core.native import Frame
+from hullguard.core.protect import Protector
 from hullguard.design.design import Design
+from hullguard.design.protection import NONE, check_protection
 from hullguard.errors import InputError
+from hullguard.model.network import protection
 
 FLOATS = {16: ("<e", 0x7E00), 32: ("<f", 0x7FC00000), 64: ("<d", 0x7FF8000000000000)}  # bits: format, quiet NaN
 KIND = EXTENDED | REMOTE | FD | ERROR
-
-
-@dataclass(frozen=True)
-class Header:
-    """What protection adds to a frame that is in order. stamp: sample index modulo 16, None where the frame has none."""
-
-    counter: int
-    stamp: int | None
-
-
-class Protection(Protocol):
-    """End-to-end protection of one message."""
-
-    @property
-    def modulus(self) -> int:
-        """Values of the sequence counter."""
-
-    @property
-    def crc(self) -> int:
-        """A byte of the checksum."""
-
-    def protect(self, data: bytes, counter: int, stamp: int) -> bytes:
-        """The data with counter, stamp and checksum in place."""
-
-    def check(self, data: bytes) -> Header | None:
-        """The header; None: damaged."""
-
-
-class Profile22:
-    """Profile 22 by the C library (e2e.h)."""
-
-    crc = 0
-
-    def __init__(self, library: Library, data_ids: bytes) -> None:
-        from hullguard.core.protect import Protector
-        from hullguard.design.protection import ProtectionTable
-        self._p = Protector(library, ProtectionTable("P22", 0, 8, 0, 12, "both", 0, tuple(data_ids), ()))
-        self.modulus = 16
-
-    def protect(self, data: bytes, counter: int, stamp: int) -> bytes:
-        return self._p.protect(data, counter, stamp)
-
-    def check(self, data: bytes) -> Header | None:
-        h = self._p.check(data)
-        return None if h is None else Header(h.counter, h.stamp)
 
 
 @dataclass(frozen=True)
@@ -196,7 +154,7 @@ class Layout:
     flags: int
     length: int
     fields: dict[str, Field]
-    protection: Protection | None
+    protection: Protector | None
 
     def carries(self, frame: Frame) -> bool:
         """Is it a frame of this message, whole and of its kind? Its checksum does not count."""
@@ -207,8 +165,7 @@ class Layout:
         """Bits of the data that protection leaves as they are."""
         if self.protection is None:
             return tuple(range(8 * self.length))
-        zero, ones = (self.protection.protect(bytes([b]) * self.length, 0, 0) for b in (0, 255))
-        return tuple(i for i in range(8 * self.length) if i // 8 != self.protection.crc and not zero[i // 8] >> i % 8 & 1 and ones[i // 8] >> i % 8 & 1)
+        return tuple(i for i in range(8 * self.length) if i not in self.protection.table.bits)
 
     def renewed(self, frame: Frame, data: bytes) -> Frame:
         """The frame with other data and its own counter and stamp, protected anew. One that was damaged before stays so."""
@@ -223,7 +180,7 @@ class Layout:
         """Data that are in order, with a checksum that is not."""
         if self.protection is None:
             return data
-        at = self.protection.crc
+        at = self.protection.table.crc
         return data[:at] + bytes([data[at] ^ 0x01]) + data[at + 1 :]
 
 
@@ -284,23 +241,11 @@ class Codec:
         return "good" if all(valued) else "invalid"
 
 
-def _protection(message: Any) -> Protection | None:
+def _protection(message: Any) -> Protector | None:
     """What the attributes of a message in a DBC say of its protection."""
-    attributes = message.dbc.attributes if message.dbc is not None else {}
-    kind = attributes.get("E2EProfile")
-    chosen = kind.definition.choices[int(kind.value)] if kind is not None and isinstance(kind.value, int) else str(kind.value) if kind is not None else "None"
-    if chosen == "None":
-        return None
-    if chosen != "P22":
-        raise InputError(f"message '{message.name}': protection profile '{chosen}' is not known here; use P22 or None")
-    listed = attributes.get("E2EDataIdList")
-    try:
-        ids = bytes.fromhex(str(listed.value) if listed is not None else "")
-    except ValueError:
-        ids = b""
-    if len(ids) != 16:
-        raise InputError(f"message '{message.name}': E2EDataIdList must be 16 bytes in hexadecimal")
-    return Profile22(library(), ids)
+    table = protection(message)
+    check_protection(table, message.length, f"message '{message.name}'")
+    return None if table.profile == NONE else Protector(library(), table)
 
 
 def _fields(message: Any) -> dict[str, Field]:

@@ -8,8 +8,9 @@ from random import Random
 from typing import ClassVar
 
 from hullguard.core.native import Frame
+from hullguard.core.protect import Header
 from hullguard.errors import InputError
-from hullguard.inject.codec import Codec, Field, Header, Layout
+from hullguard.inject.codec import Codec, Field, Layout
 from hullguard.inject.options import option
 
 STAMP_MODULUS = 16

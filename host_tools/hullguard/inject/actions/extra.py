@@ -8,8 +8,9 @@ from typing import ClassVar
 
 from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE, frame_of
 from hullguard.core.native import Frame
+from hullguard.core.protect import Header
 from hullguard.errors import InputError
-from hullguard.inject.codec import Codec, Field, Header, Layout
+from hullguard.inject.codec import Codec, Field, Layout
 from hullguard.inject.options import option
 from hullguard.inject.shot import COPY, GONE, Action, Change, Shot, assignments
 
