@@ -175,6 +175,7 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--limit", action="store_true", help="add the earliest detection that any sound detector could make, by linear programming, to each case")
     p.add_argument("--plants", type=_positive, default=0, metavar="M", help="emulate M plants drawn from the model's intervals in turn, half of them at corners")
     p.add_argument("--attack", type=float, default=0.0, metavar="SHARE", help="share of the runs whose disturbances are chosen against the detector, within the model's bounds")
+    p.add_argument("--inject", action="append", default=[], metavar="SPEC", help="faulty frames: a directive of `inject`, or all; every counter is compared with the ledger")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
     p.add_argument("--scheduler", metavar="ADDRESS", help="work on a Dask cluster instead: its scheduler's tcp://HOST:PORT, or local; the results are the same")
     p.add_argument("--table", metavar="FILE", help="all runs as a table, a row each: FILE.parquet or FILE.csv")
@@ -191,16 +192,16 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
 
-    p = add("inject", "faults on a bus, tapped or between two channels, or in a log")
-    p.epilog = f"{inject.SPEC}\n{STATUS}"
-    inject.add_arguments(p, _seed)
-    _output(p)
-
     p = add("convert", "recordings of CAN frames from one format into another, by suffix: .log (candump -L), .pcap, .pcapng, .blf, .mf4, .asc")
     p.add_argument("source", metavar="IN", help="recording to read")
     p.add_argument("target", metavar="OUT", help="file to write; with --dbc it may be .csv: signals for PlotJuggler")
     p.add_argument("--channel", metavar="NAME", help="only frames of this channel (default: all)")
     p.add_argument("--dbc", metavar="FILE", help="what the frames mean, for a .csv")
+    _output(p)
+
+    p = add("inject", "faults on a bus, tapped or between two channels, or in a log")
+    p.epilog = f"{inject.SPEC}\n{STATUS}"
+    inject.add_arguments(p, _seed)
     _output(p)
 
     p = add("report", "draw report.html from the files of a run, or campaign.html from those of a campaign")
@@ -224,8 +225,8 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
-        "inject": run_inject,
         "convert": commands.run_convert,
+        "inject": run_inject,
         "report": commands.run_report,
     }
 

@@ -583,6 +583,10 @@ def run_campaign(args: argparse.Namespace) -> int:
     """`hullguard campaign`."""
     if args.runs < 1:
         raise InputError(f"--runs {args.runs}: expected at least 1")
+    if args.inject:
+        from hullguard.campaign.frames_command import run_frames
+
+        return run_frames(args)
     if args.table:
         check_table(Path(args.table))
     out = Path(args.out) if args.out else None

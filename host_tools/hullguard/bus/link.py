@@ -33,7 +33,6 @@ def to_message(frame: Frame) -> can.Message:
         data=frame.data,
         is_extended_id=bool(frame.flags & EXTENDED),
         is_remote_frame=bool(frame.flags & REMOTE),
-        is_error_frame=bool(frame.flags & ERROR),
         is_fd=bool(frame.flags & FD),
         bitrate_switch=bool(frame.flags & BRS),
     )

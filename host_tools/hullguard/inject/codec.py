@@ -17,24 +17,16 @@ import cantools
 from hullguard.bus.candump import ERROR, EXTENDED, FD, REMOTE
 from hullguard.codegen.dbc import emit_dbc
 from hullguard.codegen.names import names_of
-from hullguard.core.library import Library, library
+from hullguard.core.library import library
 from hullguard.core.native import Frame
 from hullguard.core.protect import Protector
 from hullguard.design.design import Design
-from hullguard.design.protection import NONE, ProtectionTable
+from hullguard.design.protection import NONE, check_protection
 from hullguard.errors import InputError
 from hullguard.model.network import protection
 
 FLOATS = {16: ("<e", 0x7E00), 32: ("<f", 0x7FC00000), 64: ("<d", 0x7FF8000000000000)}  # bits: format, quiet NaN
 KIND = EXTENDED | REMOTE | FD | ERROR
-
-
-class Protection(Protector):
-    """End-to-end protection of one message; `crc` is a byte of its checksum."""
-
-    def __init__(self, library: Library, table: ProtectionTable) -> None:
-        super().__init__(library, table)
-        self.crc = table.crc
 
 
 @dataclass(frozen=True)
@@ -162,7 +154,7 @@ class Layout:
     flags: int
     length: int
     fields: dict[str, Field]
-    protection: Protection | None
+    protection: Protector | None
 
     def carries(self, frame: Frame) -> bool:
         """Is it a frame of this message, whole and of its kind? Its checksum does not count."""
@@ -173,8 +165,7 @@ class Layout:
         """Bits of the data that protection leaves as they are."""
         if self.protection is None:
             return tuple(range(8 * self.length))
-        zero, ones = (self.protection.protect(bytes([b]) * self.length, 0, 0) for b in (0, 255))
-        return tuple(i for i in range(8 * self.length) if i // 8 != self.protection.crc and not zero[i // 8] >> i % 8 & 1 and ones[i // 8] >> i % 8 & 1)
+        return tuple(i for i in range(8 * self.length) if i not in self.protection.table.bits)
 
     def renewed(self, frame: Frame, data: bytes) -> Frame:
         """The frame with other data and its own counter and stamp, protected anew. One that was damaged before stays so."""
@@ -189,7 +180,7 @@ class Layout:
         """Data that are in order, with a checksum that is not."""
         if self.protection is None:
             return data
-        at = self.protection.crc
+        at = self.protection.table.crc
         return data[:at] + bytes([data[at] ^ 0x01]) + data[at + 1 :]
 
 
@@ -248,6 +239,13 @@ class Codec:
         if any(v and not f.in_range(frame.data) for f, v in zip(held, valued, strict=True)):
             return "numeric"
         return "good" if all(valued) else "invalid"
+
+
+def _protection(message: Any) -> Protector | None:
+    """What the attributes of a message in a DBC say of its protection."""
+    table = protection(message)
+    check_protection(table, message.length, f"message '{message.name}'")
+    return None if table.profile == NONE else Protector(library(), table)
 
 
 def _fields(message: Any) -> dict[str, Field]:

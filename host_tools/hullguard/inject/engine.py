@@ -29,6 +29,7 @@ class Sent:
 
     time_s: float
     frame: Frame
+    expects: str = ""  # of the label that tells of it: health counters of a receiver, one of which it raises; empty: nobody touched it
 
 
 class _Stage:
@@ -165,7 +166,7 @@ class Injector:
             if item.stage < len(self._stages):
                 todo.extendleft(reversed(self._process(item, time_s)))
             elif item.frame is not None and (self._gateway or not item.real):
-                out.append(Sent(time_s, item.frame))
+                out.append(Sent(time_s, item.frame, item.told))
         self.sent += len(out)
         return out
 
@@ -175,18 +176,23 @@ class Injector:
         if item.frame is not None and not stage.wants(item.frame):
             return [replace(item, stage=beyond, over=False)]
         further: list[Pending] = []
+        made_here: list[Pending] = []
+        told = ""
 
         def send(frame: Frame, delay_s: float = 0.0, original: bool | Pending = False) -> Pending:
             """`original`: it is the frame itself that goes on its way, or the one that was held here."""
             origin = original if isinstance(original, Pending) else item
-            made = Pending(frame, beyond, bool(original) and origin.real, origin.index)
+            made = Pending(frame, beyond, bool(original) and origin.real, origin.index, told=original.told if isinstance(original, Pending) else told)
+            made_here.append(made)
             if delay_s > 0.0:
                 return self._push(time_s + delay_s, made)
             further.append(made)
             return made
 
         def label(sent: Sequence[Frame], detail: str = "", expects: str | None = None, delay_s: float = 0.0) -> None:
-            self._label(stage, item, sent, detail, "|".join(stage.action.expects) if expects is None else expects, time_s + delay_s)
+            nonlocal told
+            told = "|".join(stage.action.expects) if expects is None else expects
+            self._label(stage, item, sent, detail, told, time_s + delay_s)
 
         shot = Shot(item.frame, time_s, stage.random, self.traffic, send, label)
         fires = stage.fires(time_s, item.frame is None)
@@ -194,9 +200,13 @@ class Injector:
             if fires:
                 stage.action.fire(shot)
             self._wake(item.stage)
-            return further
-        left = stage.action.fire(shot) if fires else stage.action.passing(shot)
-        return ([Pending(left, beyond, item.real, item.index)] if left is not None else []) + further
+            left = None
+        else:
+            left = stage.action.fire(shot) if fires else stage.action.passing(shot)
+        for made in made_here:
+            made.told = made.told or told or item.told
+        kept = [] if left is None else [Pending(left, beyond, item.real, item.index, told=item.told if left is item.frame else told or item.told)]
+        return kept + further
 
     def _label(self, stage: _Stage, item: Pending, sent: Sequence[Frame], detail: str, expects: str, time_s: float) -> None:
         d = stage.directive

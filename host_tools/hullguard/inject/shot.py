@@ -59,6 +59,7 @@ class Pending:
     real: bool = False  # one that came in, not an injected one
     index: int | None = None
     over: bool = False  # sent, or called off
+    told: str = ""  # what the label of the last directive that made or changed it expects
 
 
 @dataclass

@@ -23,11 +23,11 @@ class BusLoad:
 
     def clear(self) -> None:
         """Begin again with the next frame."""
-        self._ring = np.zeros(BINS, dtype=np.int64)
-        self._closed, self._open, self._total, self._peak, self._start = 0, 0, 0, 0, None
+        self._ring = np.zeros(BINS)
+        self._closed, self._open, self._total, self._peak, self._start = 0, 0.0, 0.0, 0.0, None
 
-    def add(self, time_s: float, bits: int) -> None:
-        """A frame. Its place is the open bin, or a later one; time that steps back stays in the open bin."""
+    def add(self, time_s: float, bits: float) -> None:
+        """A frame, in bits of the nominal rate. Its place is the open bin, or a later one; time that steps back stays in the open bin."""
         self.move(time_s)
         self._open += bits
 
@@ -50,10 +50,10 @@ class BusLoad:
 
     def _close(self) -> None:
         self._ring[self._closed % BINS] = self._open
-        self._closed, self._total, self._open = self._closed + 1, self._total + self._open, 0
-        self._peak = max(self._peak, int(self._last(self._peak_bins).sum()))
+        self._closed, self._total, self._open = self._closed + 1, self._total + self._open, 0.0
+        self._peak = max(self._peak, float(self._last(self._peak_bins).sum()))
 
-    def _last(self, count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    def _last(self, count: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         held = min(count, self._closed, BINS)
         return self._ring[np.arange(self._closed - held, self._closed) % BINS]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Callable
 
-from hullguard.bus.bits import load_bound
+from hullguard.bus.bits import bit_times, load_bound
 from hullguard.bus.candump import ERROR, EXTENDED
-from hullguard.core.native import Frame, Native, Verdict, frame_bits
+from hullguard.core.native import Frame, Native, Verdict, data_bits, frame_bits
 from hullguard.design.design import Design
 from hullguard.design.judges import judges, residual_columns, residual_names
 from hullguard.monitor.ecu import EcuWatch, named
@@ -47,7 +47,7 @@ class Monitor(Detector):
         self.groups = [GroupWatch(g) for g in tables.groups]
         self._place = {(g.message.id, g.message.flags & EXTENDED): i for i, g in enumerate(tables.groups)}
         self._own = {(m.id, m.flags & EXTENDED) for m in (tables.verdict, tables.status)}
-        self._bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
+        self._bound = load_bound(tables, model.bitrate_bps, model.sample_time_s, model.data_bitrate_bps)
         self._judges = judges(design)
         self._names, self._columns = residual_names(self._judges), residual_columns(self._judges)
         self._links = native.library.ffi.typeof("hg_link_health").fields
@@ -98,7 +98,8 @@ class Monitor(Detector):
             return False
         bits = frame_bits(self.native.library, frame)
         self._bits += bits
-        self.load.add(self.time_s, bits)
+        model = self.design.model
+        self.load.add(self.time_s, bit_times(bits, data_bits(self.native.library, frame), model.bitrate_bps, model.data_bitrate_bps))
         key = (frame.id, frame.flags & EXTENDED)
         if key in self._own:
             self._ecu(frame, bits)
@@ -123,17 +124,18 @@ class Monitor(Detector):
         if self.ecu.hash is not None:
             self._say("model", "the ECU runs this model" if self.ecu.model == "match" else f"the ECU runs another model, {self.ecu.hash:08x}")
 
-    def take(self, frame: Frame, time_s: float) -> None:
+    def take(self, frame: Frame, time_s: float) -> int:
         """A frame that concerns the detector: booked, and its group's intervals and losses with it."""
         place = self._place[(frame.id, frame.flags & EXTENDED)]
         group, before, k, outages = self.groups[place], self._health(place), int(self.node.node.k), self.outages
-        super().take(frame, time_s)
+        status = super().take(frame, time_s)
         if self.outages != outages:
             self._jumped()
         after = self._health(place)
         group.lost(after["lost"] - before["lost"], self.dropped)
         if after["good"] > before["good"]:
             group.booked(self.verdict.k if place == self.native.tables.closing and self.verdict is not None else k)
+        return status
 
     def _step(self, v: Verdict) -> None:
         if v.k != (0 if self.verdict is None else self.verdict.k + 1):

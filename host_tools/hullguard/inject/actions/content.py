@@ -73,8 +73,8 @@ class Counter(Action):
     about: ClassVar[str] = "the sequence counter jumps, and goes on from there to the end; the checksum is renewed"
     example: ClassVar[str] = "counter:by=3@id=measurement,nth=10"
     needs_gateway: ClassVar[str] = "change a frame"
-    expects: ClassVar[tuple[str, ...]] = ("lost", "sequence")
-    also: ClassVar[tuple[str, ...]] = ()
+    expects: ClassVar[tuple[str, ...]] = ("good", "sequence", "repeated")
+    also: ClassVar[tuple[str, ...]] = ("lost",)
 
     by: int = option(1, "how far, modulo the counter's range")
     _offset: dict[str, int] = field(default_factory=dict, init=False)

@@ -95,7 +95,8 @@ class Spoof(Action):
         made = self._whole or (self._forged(shot, layout) if layout is not None else None)
         if made is not None:
             reception = shot.traffic.codec.reception(made)
-            shot.label([made], "forged", "good|repeated" if reception == "good" else reception)
+            placed = self.counter is None and self.stamp is None
+            shot.label([made], "forged", reception if reception not in ("good", "invalid") else "good|repeated" if placed else "good|repeated|early|late|sequence")
             shot.send(made)
         return shot.frame
 

@@ -150,6 +150,6 @@ class Duplicate(Action):
     def fire(self, shot: Shot) -> Frame | None:
         """Copies behind the frame."""
         for i in range(1, self.times + 1):
-            shot.label([shot.given], f"copy {i}", delay_s=i * self.gap)
+            shot.label([shot.given], f"copy {i}", "repeated|late|sequence" if self.gap else None, i * self.gap)
             shot.send(replace(shot.given), i * self.gap)
         return shot.frame
