@@ -35,6 +35,7 @@ def to_message(frame: Frame) -> can.Message:
         is_remote_frame=bool(frame.flags & REMOTE),
         is_fd=bool(frame.flags & FD),
         bitrate_switch=bool(frame.flags & BRS),
+        is_error_frame=bool(frame.flags & ERROR),
     )
 
 

@@ -269,8 +269,7 @@ def codec_of(text: str, source: str, closing: str | None = None) -> Codec:
     layouts = []
     for m in database.messages:
         flags = (EXTENDED if m.is_extended_frame else 0) | (FD if m.is_fd else 0)
-        stated = protection(m)
-        layouts.append(Layout(m.name, m.frame_id, flags, m.length, _fields(m), Protection(library(), stated) if stated.profile != NONE else None))
+        layouts.append(Layout(m.name, m.frame_id, flags, m.length, _fields(m), _protection(m)))
     made = Codec(tuple(layouts), None, source)
     return replace(made, closing=made.message(closing)) if closing else made
 
