@@ -8,4 +8,4 @@ from node_support import run_inside
 
 
 def test_monitor_on_vcan(tmp_path: Path) -> None:
-    run_inside("monitor_inside.py", tmp_path)
+    run_inside("monitor_inside.py", out=tmp_path)
