@@ -198,7 +198,7 @@ static void no_alarm_is_confirmed_whatever_comes(void **state)
     (void)state;
     const uint32_t seed = seed_of_run(1U);
     unsigned provisional = 0U;
-    for (uint32_t i = 0U; i < 150U; i++) {
+    for (uint32_t i = 0U; i < 500U; i++) {
         for (size_t l = 0U; l < COUNT(kinds); l++) {
             against(&kinds[l], seed + i, (l >= STAMPED) || ((i & 2U) != 0U)); /* without stamps a clock is needed (node.h) */
             provisional += r.provisional;
