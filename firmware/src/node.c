@@ -142,7 +142,7 @@ static uint16_t step_max(const hg_node *self, uint8_t group, uint32_t k)
 {
     const hg_link *link = &self->link[group];
     const hg_trigger_config *trigger = self->config->detector->hold[group].trigger;
-    if ((!link->timed) || (!self->synchronised)) {
+    if (!link->timed) {
         return HG_E2E_ANY_STEP;
     }
     uint32_t shortest = UINT8_MAX;
@@ -166,10 +166,7 @@ static hg_status admit_sample(hg_node *self, uint8_t group, const hg_e2e_header 
     const uint32_t k = (self->k + ahead) - ((ahead > STAMP_AHEAD_MAX) ? (STAMP_MASK + 1U) : 0U);
     const uint16_t step = step_max(self, group, k);
     hg_e2e_receiver moved = link->receiver;
-    hg_status status = hg_e2e_sequence(e2e, &moved, header, step, progress);
-    if (status == HG_E_REPEATED) {
-        return status;
-    }
+    hg_status status = hg_e2e_sequence(e2e, &moved, header, step, progress); /* no repetition: admit() has looked */
     /* In a time that is long enough for a whole turn the counter says nothing for certain. */
     progress->continues = progress->continues && (step <= hg_e2e_modulus(e2e));
     if ((ahead == 0U) || (status == HG_OK)) {

@@ -272,6 +272,40 @@ static void a_node_refuses_contradictions(void **state)
     assert_status(HG_OK, hg_node_start(&r.self, &usual, &r.memory, HG_START_REST));
 }
 
+/* The node's own frames begin as frame.h draws them, and the closing frame has a counter. */
+static void a_node_refuses_other_headers_of_its_own(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    hg_e2e_config other[4] = {rules[2], rules[2], rules[2], rules[2]};
+    other[0].profile = HG_E2E_P02;
+    other[1].crc = 7U;
+    other[2].counter = 16U;
+    other[3].stamp = HG_E2E_NO_STAMP;
+    for (size_t i = 0U; i < COUNT(other); i++) {
+        hg_message message = verdict_message;
+        hg_node_config c[2] = {usual, usual};
+        message.e2e = &other[i];
+        c[0].verdict = &message;
+        c[1].status = &message;
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c[0], &r.memory, HG_START_REST));
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c[1], &r.memory, HG_START_REST));
+    }
+    hg_e2e_config uncounted[2] = {rules[1], rules[1]};
+    uncounted[0].profile = HG_E2E_NONE;
+    uncounted[1].ignore = HG_E2E_IGNORE_COUNTER;
+    for (size_t i = 0U; i < COUNT(uncounted); i++) {
+        hg_message message[SM_GROUPS] = {messages[0], messages[1]};
+        hg_node_config c = usual;
+        c.message = message;
+        message[0].e2e = &uncounted[i];
+        assert_status(HG_OK, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+        message[1].e2e = &uncounted[i];
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+    }
+}
+
 /* ---- frames into a node ---- */
 
 static void samples_follow_one_another_and_the_index_wraps(void **state)
@@ -491,6 +525,26 @@ static void a_measurement_of_another_sample_is_never_booked(void **state)
     }
 }
 
+/* Whatever its stamp says, with that check off it is of the sample that is open. */
+static void a_stamp_may_be_ignored(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_e2e_config careless = rules[0];
+    careless.ignore = HG_E2E_IGNORE_STAMP;
+    hg_message loose[SM_GROUPS] = {messages[0], messages[1]};
+    loose[0].e2e = &careless;
+    hg_node_config config = usual;
+    config.message = loose;
+    begin_with(&r, &config, HG_START_REST);
+    for (uint32_t k = 0U; k < 40U; k++) {
+        assert_status(HG_OK, give(&r, 0U, 5U * k, 10, 10));
+        assert_status(HG_OK, give(&r, 1U, k, 10, 0));
+        step(&r, k);
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+    }
+}
+
 /* Samples of the closing frame alone. */
 static void ticks(rig *r, uint32_t from, uint32_t to)
 {
@@ -538,6 +592,21 @@ static void a_counter_that_jumped_is_refused_once(void **state)
             ticks(&r, 1U + silent, 2U + silent);
             assert_status(HG_OK, give(&r, 0U, 2U + silent, 0, 0)); /* the next is compared with the refused one */
         }
+    }
+}
+
+/* After a silence in which more frames can have been sent than any step can say, every counter fits. */
+static void after_a_very_long_silence_any_counter_fits(void **state)
+{
+    (void)state;
+    for (uint8_t lost = 0U; lost < 16U; lost++) {
+        static rig r;
+        begin(&r, HG_START_REST);
+        sample(&r, 0U, 0, 0, 0);
+        r.link[0].k -= 70000U + lost;
+        r.counter[0] = (uint8_t)(r.counter[0] + lost);
+        assert_status(HG_OK, give(&r, 0U, 1U, 0, 1));
+        assert_int_equal(lost, hg_node_health(&r.self, 0U)->lost);
     }
 }
 
@@ -1452,6 +1521,7 @@ int main(void)
         cmocka_unit_test(what_cannot_be_sent_goes_out_as_invalid),
         cmocka_unit_test(a_node_refuses_null),
         cmocka_unit_test(a_node_refuses_contradictions),
+        cmocka_unit_test(a_node_refuses_other_headers_of_its_own),
         cmocka_unit_test(samples_follow_one_another_and_the_index_wraps),
         cmocka_unit_test(foreign_frames_are_not_ours),
         cmocka_unit_test(a_frame_of_wrong_kind_or_length_is_refused_and_counts_as_lost),
@@ -1461,8 +1531,10 @@ int main(void)
         cmocka_unit_test(a_duplicate_is_counted_and_harmless),
         cmocka_unit_test(a_second_frame_of_one_sample_is_no_duplicate_but_a_loss),
         cmocka_unit_test(a_measurement_of_another_sample_is_never_booked),
+        cmocka_unit_test(a_stamp_may_be_ignored),
         cmocka_unit_test(lost_frames_are_counted_by_the_sequence),
         cmocka_unit_test(a_counter_that_jumped_is_refused_once),
+        cmocka_unit_test(after_a_very_long_silence_any_counter_fits),
         cmocka_unit_test(a_missing_tick_is_a_step),
         cmocka_unit_test(one_late_tick_is_a_straggler),
         cmocka_unit_test(old_ticks_between_leave_the_others_in_step),
