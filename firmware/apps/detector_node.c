@@ -38,6 +38,7 @@ typedef struct {
     const app_model *model;
     const char      *interface;
     const char      *timing;       /* file name or null */
+    const char      *health;       /* the same */
     hg_start         how;
     bool             lockstep;
     bool             status;
@@ -86,6 +87,7 @@ static const char usage[] =
     "  --samples N        stop after N samples (0: never)\n"
     "  --status           print a line of status every second\n"
     "  --timing FILE      when done, write the missed deadlines to FILE\n"
+    "  --health FILE      when done, write every counter of every group to FILE\n"
     "  --list             print the models compiled in, each with its hash, and end\n"
     "  --help, --version\n"
     "Prints 'ready' when it listens. SIGINT and SIGTERM end it. Exit status: 0 done, 1 failed, 2 bad option, 3 the bus cannot be opened.\n";
@@ -139,6 +141,7 @@ enum {
     OPTION_SAMPLES,
     OPTION_STATUS,
     OPTION_TIMING,
+    OPTION_HEALTH,
     OPTION_LIST,
     OPTION_HELP,
     OPTION_VERSION
@@ -179,6 +182,9 @@ static int take_option(options *self, int option, const char *value)
     case OPTION_TIMING:
         self->timing = value;
         return -1;
+    case OPTION_HEALTH:
+        self->health = value;
+        return -1;
     case OPTION_LIST:
         list_models();
         return EXIT_SUCCESS;
@@ -202,6 +208,7 @@ static int read_options(options *self, int argc, char **argv)
         {"samples", required_argument, NULL, OPTION_SAMPLES},   {"status", no_argument, NULL, OPTION_STATUS},
         {"timing", required_argument, NULL, OPTION_TIMING},     {"help", no_argument, NULL, OPTION_HELP},
         {"version", no_argument, NULL, OPTION_VERSION},         {"list", no_argument, NULL, OPTION_LIST},
+        {"health", required_argument, NULL, OPTION_HEALTH},
         {NULL, 0, NULL, 0},
     };
     *self = (options){.model = app_model_at(0U), .interface = "vcan0", .how = HG_START_MOVING, .slack_us = UINT64_MAX};
@@ -386,7 +393,7 @@ static void print_status(app *self)
     for (uint8_t i = 0U; i < config->detector->groups; i++) {
         const hg_link_health *health = hg_node_health(self->node, i);
         const unsigned refused = (unsigned)health->crc + health->format + health->repeated + health->early + health->late + health->sequence + health->untrusted + health->numeric;
-        (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", self->options.model->group[i], bus[(self->verdict.bus >> (2U * i)) & 0x3U],
+        (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", self->options.model->group[i], bus[((unsigned)self->verdict.bus >> (2U * i)) & 0x3U],
                      (unsigned)health->good, (unsigned)health->lost, refused);
     }
     (void)printf(" frames_per_s=%" PRIu32 " missed=%" PRIu64 " outages=%" PRIu64 " unsent=%" PRIu64 " can=%s errors=%" PRIu32
@@ -396,23 +403,54 @@ static void print_status(app *self)
     self->received = report.received;
 }
 
+/* Opens a file that an option names; null, and a line, when it cannot be. */
+static FILE *open_file(const char *option, const char *name)
+{
+    FILE *file = fopen(name, "w");
+    if (file == NULL) {
+        (void)fprintf(stderr, "detector_node: %s '%s': %s; name a file that can be written\n", option, name, strerror(errno));
+    }
+    return file;
+}
+
+static bool close_file(FILE *file)
+{
+    const bool good = ferror(file) == 0;
+    return (fclose(file) == 0) && good;
+}
+
 static bool write_timing(const app *self)
 {
-    if (self->options.timing == NULL) {
-        return true;
-    }
-    FILE *file = fopen(self->options.timing, "w");
+    FILE *file = (self->options.timing != NULL) ? open_file("--timing", self->options.timing) : NULL;
     if (file == NULL) {
-        (void)fprintf(stderr, "detector_node: --timing '%s': %s; name a file that can be written\n", self->options.timing, strerror(errno));
-        return false;
+        return self->options.timing == NULL;
     }
     (void)fprintf(file, "# samples %" PRIu64 " missed %" PRIu64 " outages %" PRIu64 "\n# k due_us noticed_us (CLOCK_MONOTONIC)\n",
                   self->steps, self->missed, self->outages);
     for (uint64_t i = 0U; (i < self->missed) && (i < MISSES_MAX); i++) {
         (void)fprintf(file, "%" PRIu32 " %" PRIu64 " %" PRIu64 "\n", misses[i].k, misses[i].due_us, misses[i].noticed_us);
     }
-    const bool good = ferror(file) == 0;
-    return (fclose(file) == 0) && good;
+    return close_file(file);
+}
+
+static bool write_health(const app *self)
+{
+    FILE *file = (self->options.health != NULL) ? open_file("--health", self->options.health) : NULL;
+    if (file == NULL) {
+        return self->options.health == NULL;
+    }
+    for (uint8_t i = 0U; i < self->options.model->config->detector->groups; i++) {
+        const hg_link_health *h = hg_node_health(self->node, i);
+        const struct {
+            const char *name;
+            uint16_t    count;
+        } counters[] = {{"good", h->good}, {"lost", h->lost}, {"crc", h->crc}, {"format", h->format}, {"repeated", h->repeated}, {"early", h->early},
+                        {"late", h->late}, {"sequence", h->sequence}, {"untrusted", h->untrusted}, {"numeric", h->numeric}, {"invalid", h->invalid}};
+        for (size_t j = 0U; j < (sizeof(counters) / sizeof(counters[0])); j++) {
+            (void)fprintf(file, "%s.%s %u\n", self->options.model->group[i], counters[j].name, (unsigned)counters[j].count);
+        }
+    }
+    return close_file(file);
 }
 
 /* ---- the loop ---- */
@@ -489,7 +527,8 @@ int main(int argc, char **argv)
         if (self.options.status) {
             print_status(&self);
         }
-        if ((!write_timing(&self)) && (result == EXIT_SUCCESS)) {
+        const bool timed = write_timing(&self);
+        if (((!write_health(&self)) || (!timed)) && (result == EXIT_SUCCESS)) {
             result = EXIT_FAILED;
         }
     }

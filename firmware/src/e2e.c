@@ -11,7 +11,7 @@
 #define FINAL_H2F 0xFFU
 #define START_CCITT 0xFFFFU
 
-const hg_e2e_limits hg_e2e_limits_default = {.init = {.window = 8U, .ok = 1U, .error = 0U},
+const hg_e2e_limits hg_e2e_limits_default = {.init = {.window = 8U, .ok = 1U, .error = 2U},
                                              .valid = {.window = 8U, .ok = 1U, .error = 3U},
                                              .invalid = {.window = 8U, .ok = 2U, .error = 2U},
                                              .clear = false};
@@ -383,7 +383,7 @@ hg_e2e_state hg_e2e_machine_step(hg_e2e_machine *self, const hg_e2e_limits *limi
     self->error = (uint16_t)((uint16_t)(self->error << 1U) | (error ? 1U : 0U));
     switch (self->state) {
     case HG_E2E_NODATA:
-        keep(self, limits->init.window);
+        keep(self, 0U); /* the window of INIT begins with INIT */
         if ((!error) && (event != HG_E_EMPTY)) {
             self->state = HG_E2E_INIT;
         }

@@ -126,6 +126,9 @@ void hg_frame_pack(const hg_message *message, const int32_t *code, hg_can_frame 
     frame->id = message->id;
     frame->flags = message->flags;
     frame->length = message->length;
+    if (message->idle != NULL) {
+        (void)memcpy(frame->data, message->idle, message->length);
+    }
     for (uint8_t g = 0U; g < message->width; g++) {
         const hg_field *field = &message->field[g];
         const uint32_t pattern = pattern_of(field, &message->scale[g], code[g]);

@@ -54,6 +54,16 @@ static bool stamped(const hg_e2e_config *e2e)
     return (e2e->stamp != HG_E2E_NO_STAMP) && ((e2e->ignore & HG_E2E_IGNORE_STAMP) == 0U);
 }
 
+/* Does a sender speak every interval_max samples, whatever its signals do? Its silence promises nothing, and its age tells of every loss. */
+static bool periodic(const hg_trigger_config *trigger)
+{
+    bool always = true;
+    for (uint8_t l = 0U; l < trigger->levels; l++) {
+        always = always && ((trigger->silence[l] + 1U) >= trigger->interval_max);
+    }
+    return always;
+}
+
 static bool config_valid(const hg_node_config *config)
 {
     bool valid = (config->detector != NULL) && (config->message != NULL) && (config->verdict != NULL) && (config->status != NULL) &&
@@ -224,7 +234,8 @@ static bool agrees(const hg_node *self, const hg_e2e_header *header)
     const uint32_t modulus = hg_e2e_modulus(e2e);
     const uint32_t frames = ((header->counter + modulus) - self->slipped_counter) % modulus;
     const uint32_t samples = ((uint32_t)header->stamp - self->slipped_stamp) & STAMP_MASK;
-    return self->slipped && (frames >= 1U) && (frames <= STAMP_AHEAD_MAX) && ((!stamped(e2e)) || (samples == frames));
+    const bool paced = (!self->clocked) || (frames == (self->k - self->slipped_k));
+    return self->slipped && paced && (frames >= 1U) && (frames <= STAMP_AHEAD_MAX) && ((!stamped(e2e)) || (samples == frames));
 }
 
 static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint8_t ahead)
@@ -234,6 +245,7 @@ static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint
     self->slipped = true;
     self->slipped_counter = header->counter;
     self->slipped_stamp = header->stamp;
+    self->slipped_k = self->k;
     if (ahead > STAMP_AHEAD_MAX) {
         raise16(&health->late, 1U);
         status = HG_E_STAMP;
@@ -320,9 +332,11 @@ static hg_status book(hg_node *self, uint8_t group, const hg_can_frame *frame, c
         const hg_status timed = close_sample(self, (status == HG_OK) ? code : NULL, header);
         status = (timed == HG_OK) ? status : timed;
     } else if (status == HG_OK) {
-        status = hg_detector_receive(&self->detector, group, code, progress->continues);
+        const bool uncounted = (message->e2e->profile == HG_E2E_NONE) && periodic(self->config->detector->hold[group].trigger);
+        status = hg_detector_receive(&self->detector, group, code, progress->continues || uncounted);
         if (status == HG_E_REPEATED) {
-            (void)hg_detector_lose(&self->detector, group); /* no duplicate: its sender now goes by these codes */
+            /* A second good frame for one sample is no duplicate by its counter: what it said is lost, and the next frame continues it. */
+            (void)hg_detector_lose(&self->detector, group);
         }
     } else {
         /* refused */
@@ -365,10 +379,12 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
 void hg_node_expect(hg_node *self, uint32_t samples)
 {
     self->ahead_max = (samples < STAMP_AHEAD_MAX) ? (uint8_t)samples : STAMP_AHEAD_MAX;
+    self->clocked = true;
 }
 
 void hg_node_overdue(hg_node *self)
 {
+    self->clocked = true;
     if (self->due == 0U) {
         self->due = 1U;
     }

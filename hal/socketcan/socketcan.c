@@ -112,6 +112,15 @@ static void take_error_report(hg_socketcan *self, const struct canfd_frame *raw)
     }
 }
 
+/* A frame from the bus: a controller that receives it is on the bus, whoever said otherwise before. Any process of this host can write an
+ * error frame, and none may silence this one for good. */
+static void heard(hg_socketcan *self)
+{
+    if ((self->report.bus == HG_BUS_OFF) && (!self->down)) {
+        self->report.bus = HG_BUS_ACTIVE;
+    }
+}
+
 static void socketcan_state(void *object, hg_hal_report *out)
 {
     hg_socketcan *const self = object;
@@ -278,6 +287,7 @@ static hg_status socketcan_receive(void *object, hg_can_frame *frame, uint64_t *
                 *time_us = time;
             }
             hg_hal_count(&self->report.received, 1U);
+            heard(self);
             return HG_OK;
         }
     }

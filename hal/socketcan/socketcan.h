@@ -6,8 +6,8 @@
  *    a frame sent after the loss has been received.
  *  - The bus state follows the controller's error frames (bus off, restarted, controller problems). An interface that is down or gone is
  *    HG_BUS_OFF; up again it is HG_BUS_ACTIVE; one that was removed must be opened anew. Bus off reported by the controller ends with a
- *    report too (set restart-ms on the interface), or with the interface going down and up; until then send returns HG_E_BUS without
- *    trying. A virtual interface never reports anything by itself.
+ *    report too (set restart-ms on the interface), with a frame from the bus, or with the interface going down and up; until then send
+ *    returns HG_E_BUS without trying. A virtual interface never reports anything by itself, but any process may write an error frame.
  *  - Arrival times are the kernel's software stamps, carried over to CLOCK_MONOTONIC. If the wall clock is set between arrival and receive
  *    they are off by as much, but never later than now and never earlier than the frame before.
  *  - send tries `send_tries` times, HG_SOCKETCAN_RETRY_US apart, when the interface's queue is full; nothing else in here sleeps but wait.

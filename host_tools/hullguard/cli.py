@@ -9,12 +9,15 @@ from typing import NoReturn
 
 from hullguard import __version__
 from hullguard.errors import HullguardError
+from hullguard.inject import arguments as inject
 
-EPILOG = """a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
+STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
+"""
+
+EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
   NAME a signal or a fault of the model; KIND bias, drift (units a second), gain, freeze or noise; START and END sample indices
 
-exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
-"""
+{STATUS}"""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -84,6 +87,7 @@ def _drive(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--speed", default="max", metavar="X", help="max (default), or a multiple of real time; 1 is real time, with the node's timer, any other in lockstep")
     parser.add_argument("--out", metavar="DIR", help="write run.log, run.json, signals.csv, labels.csv, the DBC and report.html there")
+    parser.add_argument("--formats", metavar="F[,F..]", default="", help="with --out: the log as run.F too, F of pcap, pcapng, blf, mf4, asc")
     _expect(parser)
     _bus(parser)
 
@@ -121,16 +125,30 @@ def build_parser() -> argparse.ArgumentParser:
     _faults(p)
     _drive(p)
 
-    p = add("detect", "the detector on any python-can interface, or on a candump log")
+    p = add("detect", "the detector on any python-can interface, or on a recorded log")
     _common(p)
     _scenario(p)
-    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus")
+    p.add_argument("--log", metavar="FILE", help="recording instead of a bus: .log (candump -L), .pcap, .pcapng, .blf, .mf4 or .asc")
     p.add_argument("--lockstep", action="store_true", help="answer every closing frame with a verdict; no deadline")
     p.add_argument("--rest", action="store_true", help="the plant starts within its initial range (default: anywhere in its range)")
     p.add_argument("--listen", action="store_true", help="send nothing")
     p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
     p.add_argument("--ready", action="store_true", help="print 'ready' once the bus is open")
     _expect(p)
+    _bus(p)
+
+    p = add("monitor", "live view of a bus or a log: signals with radii, residuals, verdicts, senders, load, losses")
+    _common(p)
+    _scenario(p)
+    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus: played at its own speed in the view, at once as lines")
+    p.add_argument("--speed", metavar="X", help="max, or a multiple of the log's own speed")
+    p.add_argument("--plain", action="store_true", help="lines of key=value, also where stdout is no terminal; --json: a JSON object a line")
+    p.add_argument("--every", type=float, default=1.0, metavar="S", help="seconds between two such lines (default 1); a change has its own line at once")
+    p.add_argument("--rate", type=float, default=5.0, metavar="HZ", help="pictures a second (default 5)")
+    p.add_argument("--rest", action="store_true", help="the first frame is of a plant within its initial range (default: anywhere in its range)")
+    p.add_argument("--lockstep", action="store_true", help="the bus keeps no time: no deadline for the closing frame")
+    p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
+    p.add_argument("--snapshot", action="append", default=[], metavar="FILE", help="the last screen as FILE.svg or FILE.txt; may be given more than once")
     _bus(p)
 
     p = add("plant", "the emulated plant and its senders alone, on a bus with a node of your own")
@@ -157,6 +175,7 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--limit", action="store_true", help="add the earliest detection that any sound detector could make, by linear programming, to each case")
     p.add_argument("--plants", type=_positive, default=0, metavar="M", help="emulate M plants drawn from the model's intervals in turn, half of them at corners")
     p.add_argument("--attack", type=float, default=0.0, metavar="SHARE", help="share of the runs whose disturbances are chosen against the detector, within the model's bounds")
+    p.add_argument("--inject", action="append", default=[], metavar="SPEC", help="faulty frames: a directive of `inject`, or all; every counter is compared with the ledger")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
     p.add_argument("--scheduler", metavar="ADDRESS", help="work on a Dask cluster instead: its scheduler's tcp://HOST:PORT, or local; the results are the same")
     p.add_argument("--table", metavar="FILE", help="all runs as a table, a row each: FILE.parquet or FILE.csv")
@@ -173,6 +192,18 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
 
+    p = add("convert", "recordings of CAN frames from one format into another, by suffix: .log (candump -L), .pcap, .pcapng, .blf, .mf4, .asc")
+    p.add_argument("source", metavar="IN", help="recording to read")
+    p.add_argument("target", metavar="OUT", help="file to write; with --dbc it may be .csv: signals for PlotJuggler")
+    p.add_argument("--channel", metavar="NAME", help="only frames of this channel (default: all)")
+    p.add_argument("--dbc", metavar="FILE", help="what the frames mean, for a .csv")
+    _output(p)
+
+    p = add("inject", "faults on a bus, tapped or between two channels, or in a log")
+    p.epilog = f"{inject.SPEC}\n{STATUS}"
+    inject.add_arguments(p, _seed)
+    _output(p)
+
     p = add("report", "draw report.html from the files of a run, or campaign.html from those of a campaign")
     p.add_argument("directory", metavar="DIR", help="the --out folder of a run or campaign")
     p.add_argument("--png", metavar="FILE", help="draw the run as one picture too")
@@ -182,6 +213,8 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
+    from hullguard.inject.command import run_inject
+    from hullguard.monitor.command import run_monitor
 
     return {
         "design": commands.run_design,
@@ -189,8 +222,11 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "replay": commands.run_replay,
         "detect": commands.run_detect,
         "plant": commands.run_plant,
+        "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
+        "convert": commands.run_convert,
+        "inject": run_inject,
         "report": commands.run_report,
     }
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hullguard.bus import candump, choose
+from hullguard.bus import candump, choose, convert, formats
 from hullguard.bus.link import opened
 from hullguard.campaign import grid
 from hullguard.campaign.campaign import Way, campaign, processes
@@ -244,6 +244,7 @@ def _drive(
     if not options and args.bus == "auto" and choose.existing_vcan() is None and choose.launcher() is not None and INSIDE not in os.environ:
         return _drive_inside(args)
     out = Path(args.out) if args.out else None
+    convert.wanted(args.formats, out)
     if out is not None:
         make_folder(out)
     with _bus(args, made, native, options, start) as (bus, pace, name):
@@ -262,7 +263,7 @@ def _drive(
 
         (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
         if INSIDE not in os.environ:
-            _report(args, out)
+            _finish(args, out)
     _tell(args, result)
     emit(args, result)
     if mismatch:
@@ -276,8 +277,15 @@ def _drive_inside(args: argparse.Namespace) -> int:
     status = choose.inside(args.arguments)
     del os.environ[INSIDE]
     if args.out and (Path(args.out) / "run.json").is_file() and status in (0, 1):
-        _report(args, Path(args.out))
+        _finish(args, Path(args.out))
     return status
+
+
+def _finish(args: argparse.Namespace, out: Path) -> None:
+    """The other formats of the log, and the report."""
+    for told in convert.beside(out / "run.log", convert.wanted(args.formats, out)):
+        say(args, told)
+    _report(args, out)
 
 
 def _report(args: argparse.Namespace, out: Path) -> None:
@@ -311,7 +319,7 @@ def bus_options(args: argparse.Namespace) -> dict[str, Any]:
 @contextlib.contextmanager
 def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[str, Any], start: int) -> Iterator[tuple[Bus, Pace, str]]:
     """The bus of a run, with a detector node at its other end."""
-    speed = _speed(args.speed)
+    speed = make_speed(args.speed)
     pace = Pace(speed != 1.0, speed)  # only a real-time run uses the node's timer; at any other speed the run is deterministic
     if not options and args.bus == "auto":
         found = choose.existing_vcan()
@@ -332,7 +340,8 @@ def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[s
         yield OnCan(link, native, pace), pace, name
 
 
-def _speed(text: str) -> float:
+def make_speed(text: str) -> float:
+    """--speed: a multiple of real time; infinity for max."""
     if text == "max":
         return math.inf
     try:
@@ -435,7 +444,7 @@ def run_plant(args: argparse.Namespace) -> int:
     native = Native(library(args.real), made.tables)
     source = Plant(native, made, scenario.reference, faults, args.seed)
     options = bus_options(args) or {"interface": "socketcan", "channel": choose.existing_vcan() or "vcan0"}
-    pace = Pace(args.lockstep, _speed(args.speed))
+    pace = Pace(args.lockstep, make_speed(args.speed))
     with opened(**options) as link:
         run = Run(made, native, OnCan(link, native, pace), pace, start=MOVING if args.moving else REST)
         trace = run.samples(source, samples)
@@ -480,7 +489,7 @@ def run_detect(args: argparse.Namespace) -> int:
     start = REST if args.rest else MOVING
     if args.log:
         detector = Detector(native, start, False, None, watch, made.model.sample_time_s)
-        from_log(detector, candump.read(Path(args.log)), args.samples or 0)
+        from_log(detector, formats.read(Path(args.log)), args.samples or 0)
     else:
         options = bus_options(args)
         if not options:
@@ -499,6 +508,19 @@ def run_detect(args: argparse.Namespace) -> int:
         raise ExpectationError(f"expected quiet, but there was an alarm at sample {alarms[0]['k']}")
     if args.expect == "detect" and not alarms:
         raise ExpectationError("expected a detection, but there was no alarm")
+    return 0
+
+
+# ---- convert ----
+
+
+def run_convert(args: argparse.Namespace) -> int:
+    """`hullguard convert`."""
+    made = convert.convert(Path(args.source), Path(args.target), args.channel, Path(args.dbc) if args.dbc else None)
+    for told in made.losses:
+        print(f"hullguard: {args.target}: {told}", file=sys.stderr)
+    say(args, f"{made.frames} frames from {args.source} to {args.target}")
+    emit(args, {"frames": made.frames, "source": args.source, "target": args.target, "losses": made.losses})
     return 0
 
 
@@ -561,6 +583,10 @@ def run_campaign(args: argparse.Namespace) -> int:
     """`hullguard campaign`."""
     if args.runs < 1:
         raise InputError(f"--runs {args.runs}: expected at least 1")
+    if args.inject:
+        from hullguard.campaign.frames_command import run_frames
+
+        return run_frames(args)
     if args.table:
         check_table(Path(args.table))
     out = Path(args.out) if args.out else None

@@ -19,6 +19,7 @@ from hullguard.codegen.dbc import short
 from hullguard.codegen.names import LIBRARY
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design, design
+from hullguard.design.protection import MODES, PROFILES
 from hullguard.design.tables import (
     EXTENDED,
     FD,
@@ -162,7 +163,15 @@ static void message(const hg_message *m)
     u("flags", m->flags);
     u("length", m->length);
     u("width", m->width);
-    us("data_id", m->data_id, HG_E2E_IDS);
+    u("profile", (uint64_t)m->e2e->profile);
+    u("mode", (uint64_t)m->e2e->mode);
+    u("crc", m->e2e->crc);
+    u("counter", m->e2e->counter);
+    u("nibble", m->e2e->nibble);
+    u("stamp", m->e2e->stamp);
+    u("data_id", m->e2e->data_id);
+    if (m->e2e->data_ids != NULL) { us("data_ids", m->e2e->data_ids, HG_E2E_IDS); }
+    if (m->idle != NULL) { us("idle", m->idle, m->length); }
     for (unsigned i = 0U; i < m->width; i++) {
         u("start", m->field[i].start);
         u("bits", m->field[i].length);
@@ -360,7 +369,7 @@ static void exchange(const hg_message *m, long counter, long stamp)
         if (scanf("%" SCNd32, &code[i]) != 1) { exit(3); }
     }
     hg_frame_pack(m, code, &frame);
-    if (hg_e2e_p22_protect(frame.data, frame.length, m->data_id, (uint8_t)counter, (uint8_t)stamp) != HG_OK) { exit(4); }
+    if (hg_e2e_protect(m->e2e, frame.data, frame.length, (uint8_t)counter, (uint8_t)stamp) != HG_OK) { exit(4); }
     if (hg_frame_unpack(m, &frame, back) != HG_OK) { exit(5); }
     for (unsigned i = 0U; i < frame.length; i++) { (void)printf("%02x", frame.data[i]); }
     for (unsigned i = 0U; i < m->width; i++) { (void)printf(" %" PRId32, back[i]); }
@@ -433,11 +442,13 @@ def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
     made = {"platoon": platoon, "tank": design(load_model(str(path)))[0], "places": changed_places(platoon), "bank": design(load_model("platoon_bank"))[0]}
     made["uncertain"] = design(load_model("platoon", UNCERTAIN))[0]
     made["everything"] = design(load_model("platoon_bank", EVERYTHING))[0]
+    made["network"] = design(load_model(str(ROOT / "tests" / "fixtures" / "network" / "network.toml")))[0]
     made["published"] = design(load_model("platoon", {"detector.threshold": "zonotope_published"}))[0]
     return made
 
 
-NAMES = ("platoon", "tank", "places", "bank", "uncertain", "everything", "published")
+NAMES = ("platoon", "tank", "places", "bank", "uncertain", "everything", "published", "network")
+FIELDS = {"crc": "E2E_CRC", "counter": "E2E_counter", "nibble": "E2E_data_id", "stamp": "E2E_stamp"}
 
 
 @dataclass(frozen=True)
@@ -620,7 +631,9 @@ def _each(tag: str, values: object) -> Numbers:
 
 def _message(m: MessageTable, signals: tuple[SignalTable, ...]) -> Numbers:
     numbers = [p for key in ("id", "flags", "length") for p in _each(key, getattr(m, key))]
-    numbers += _each("width", len(signals)) + _each("data_id", m.data_id)
+    p = m.protection
+    numbers += _each("width", len(signals)) + _each("profile", 1 + PROFILES.index(p.profile)) + _each("mode", 1 + MODES.index(p.mode))
+    numbers += _some(p, "crc", "counter", "nibble", "stamp", "data_id", "data_ids") + _each("idle", m.idle)
     for s in signals:
         numbers += _each("start", s.start) + _each("bits", s.length) + _each("field_flags", s.flags)
         numbers += [p for key in ("resolution", "offset", "per_unit", "minimum", "maximum") for p in _each(key, getattr(s, key))]
@@ -740,11 +753,16 @@ def test_cantools_packs_and_reads_as_the_library_does(built: Built) -> None:
         data, message = bytes.fromhex(words[0]), _by_id(built.database, g)
         assert [int(w) for w in words[1 : 1 + len(codes)]] == codes
         signals = {s.name: _sent_value(s, code) for s, code in zip(g.signals, codes, strict=True)}
-        header: dict[str, float] = {"E2E_CRC": data[0], "E2E_counter": counter, "E2E_stamp": stamp}
-        assert message.encode({**header, **signals}, padding=False, strict=True) == data
-        read = message.decode(data)
+        p, read = g.message.protection, message.decode(data)
         assert isinstance(read, dict)
-        assert (read["E2E_CRC"], read["E2E_counter"], read["E2E_stamp"]) == (data[0], counter, stamp)
+        places = {name: int.from_bytes(data, "little") >> first & ((1 << bits) - 1) for name, (first, bits) in p.places.items()}
+        expected = {"counter": counter % p.modulus if p.modulus else 0, "stamp": stamp, "nibble": p.data_id >> 8}
+        header: dict[str, float] = {}
+        for place, found in places.items():
+            header[FIELDS[place]] = found
+            assert read[FIELDS[place]] == found == expected.get(place, found)
+        packed = message.encode({**header, **signals}, padding=False, strict=True)
+        assert bytes(a | b for a, b in zip(packed, g.message.idle or bytes(len(packed)), strict=True)) == data
         raw = message.decode(data, scaling=False)
         assert isinstance(raw, dict)
         for s, code, value in zip(g.signals, codes, words[1 + len(codes) :], strict=True):
@@ -775,12 +793,15 @@ def test_dbc_says_how_frames_are_sent(built: Built) -> None:
         assert m.dbc is not None
         assert (m.frame_id, m.length) == (g.message.id, g.message.length)
         assert (m.is_extended_frame, m.is_fd) == (bool(g.message.flags & EXTENDED), bool(g.message.flags & FD))
-        assert m.send_type == ("Event" if g.interval_max > 1 else "Cyclic")
+        assert m.send_type == ("Cyclic" if g.periodic else "Event")
         assert m.cycle_time == round(g.interval_max * sample_ms)
         assert m.senders == [f"{m.name}_sender"]
         attributes = {key: a.value for key, a in m.dbc.attributes.items()}
-        assert attributes["E2EProfile"] == 1
-        assert tuple(int(x, 16) for x in str(attributes["E2EDataIdList"]).split()) == g.message.data_id
+        p = g.message.protection
+        assert attributes["E2EProfile"] == PROFILES.index(p.profile) and attributes["E2EDataIdMode"] == MODES.index(p.mode)
+        assert tuple(int(x, 16) for x in str(attributes["E2EDataIdList"]).split()) == p.data_ids and attributes["E2EDataId"] == p.data_id
+        places = [attributes[f"E2E{key}"] for key in ("CrcByte", "CounterBit", "NibbleBit", "StampBit")]
+        assert places == [p.crc, p.counter, p.nibble, p.stamp if p.stamped else -1]
         assert attributes["VFrameFormat"] == (14 if g.message.flags & FD else 0) + (1 if g.message.flags & EXTENDED else 0)
         assert ("closes the sample" in str(m.comment)) == (place == tables.closing)
         for s in g.signals:
@@ -809,7 +830,7 @@ def test_verdict_and_status_read_as_the_node_wrote_them(built: Built) -> None:
     assert len(faults) == len(built.design.model.faults) and len(buses) == len(tables.groups)
     assert str(first["plant"]) == "confirmed" and str(first["basis"]) == "set" and str(first["refused"]) == "yes"
     assert [str(first[f]) for f in faults] == ["candidate"] + ["no"] * (len(faults) - 1)
-    assert [str(first[b]) for b in buses] == ["stale", "lossy", "good"][: len(buses)]  # 0x1B, two bits each
+    assert [str(first[b]) for b in buses] == ["stale", "lossy", "good", "absent", "absent"][: len(buses)]  # 0x1B, two bits each
     assert int(str(first["sample_high"])) + int(str(first["E2E_stamp"])) == 0xABC
     assert (str(first["reply"]), str(reply["reply"])) == ("no", "yes")
     assert (first["E2E_counter"], reply["E2E_counter"]) == (0, 1)

@@ -4,6 +4,8 @@
  *                                            DROP-th closing frame is protected and counted like all others, but not sent
  *      bus_timer watch PERIOD_US             the reference: a timer of its own, and the closing frames that arrive. A gap is more than one
  *                                            and a half periods between two of its wake-ups, or between two successive closing frames
+ *      bus_timer echo INTERFACE              answers each closing frame with a frame of its own, as soon as detector_node could: the same loop
+ *                                            on the same board, without a detector
  *  A closing frame that was never sent is no gap: the frames around it are not successive. */
 #define _POSIX_C_SOURCE 200809L
 
@@ -19,6 +21,7 @@
 
 #define SECOND_US 1000000U
 #define TRIES_MAX 200U
+#define ECHO_ID 0x7A0U
 
 typedef struct {
     uint64_t first_us, last_us; /* 0: none yet */
@@ -34,10 +37,10 @@ static int fail(const char *what)
     return EXIT_FAILURE;
 }
 
-static hg_status open_bus(const hg_hal_filter *filters, size_t count)
+static hg_status open_bus(const char *interface, const hg_hal_filter *filters, size_t count)
 {
     const hg_socketcan_options options = {.filters = filters, .filter_count = count, .depth = 8192U, .stop_on_signal = true};
-    return hg_socketcan_open(&can, "vcan0", &options);
+    return hg_socketcan_open(&can, interface, &options);
 }
 
 static void sleep_until(uint64_t us)
@@ -66,7 +69,7 @@ static int send_ticks(uint64_t period_us, uint64_t ticks, uint64_t drop)
     uint64_t dropped = 0U;
     uint64_t worst_us = 0U;
     hg_can_frame frame;
-    if ((open_bus(NULL, 0U) != HG_OK) || (hg_platoon_senders_start(&senders) != HG_OK)) {
+    if ((open_bus("vcan0", NULL, 0U) != HG_OK) || (hg_platoon_senders_start(&senders) != HG_OK)) {
         return fail("cannot start");
     }
     const hg_hal hal = hg_socketcan_hal(&can);
@@ -112,16 +115,42 @@ static void add(series *self, const char *name, uint64_t at_us, bool successive,
     self->count++;
 }
 
+static hg_hal_filter closing_frames(void)
+{
+    return (hg_hal_filter){.id = hg_platoon_config.message[HG_PLATOON_GROUP_CONTROL].id, .mask = HG_CAN_ID_EXTENDED, .flags = 0U};
+}
+
+static int echo(const char *interface)
+{
+    const hg_hal_filter filter = closing_frames();
+    hg_can_frame frame;
+    uint64_t at_us;
+    if (open_bus(interface, &filter, 1U) != HG_OK) {
+        return fail("cannot open the interface");
+    }
+    const hg_hal hal = hg_socketcan_hal(&can);
+    (void)puts("ready");
+    (void)fflush(stdout);
+    while (hg_hal_wait(&hal, HG_HAL_FOREVER) != HG_E_IO) {
+        while (hg_hal_receive(&hal, &frame, &at_us) == HG_OK) {
+            frame.id = ECHO_ID;
+            if (!sent(&hal, &frame)) {
+                return fail("a frame found no room");
+            }
+        }
+    }
+    return EXIT_SUCCESS;
+}
+
 static int watch(uint64_t period_us)
 {
-    const hg_message *message = &hg_platoon_config.message[HG_PLATOON_GROUP_CONTROL];
-    const hg_hal_filter filter = {.id = message->id, .mask = HG_CAN_ID_EXTENDED, .flags = 0U};
+    const hg_hal_filter filter = closing_frames();
     series wakes = {0U};
     series ticks = {0U};
     uint8_t stamp = 0U;
     hg_can_frame frame;
     uint64_t at_us;
-    if (open_bus(&filter, 1U) != HG_OK) {
+    if (open_bus("vcan0", &filter, 1U) != HG_OK) {
         return fail("cannot open vcan0");
     }
     const hg_hal hal = hg_socketcan_hal(&can);
@@ -158,8 +187,10 @@ int main(int argc, char **argv)
         result = send_ticks(period_us, strtoull(argv[3], NULL, 10), strtoull(argv[4], NULL, 10));
     } else if ((period_us > 0U) && (argc == 3) && (strcmp(argv[1], "watch") == 0)) {
         result = watch(period_us);
+    } else if ((argc == 3) && (strcmp(argv[1], "echo") == 0)) {
+        result = echo(argv[2]);
     } else {
-        (void)fputs("usage: bus_timer send PERIOD_US TICKS DROP | bus_timer watch PERIOD_US\n", stderr);
+        (void)fputs("usage: bus_timer send PERIOD_US TICKS DROP | bus_timer watch PERIOD_US | bus_timer echo INTERFACE\n", stderr);
     }
     hg_socketcan_close(&can);
     return result;

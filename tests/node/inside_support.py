@@ -165,6 +165,28 @@ def exchange(bus: CanLink, drive: Drive, frames: list[Frame]) -> list[Verdict]:
     return verdicts
 
 
+def _receivers() -> int:
+    """Filters of raw sockets on CAN interfaces, as the kernel lists them."""
+    return sum(line.endswith("raw") for file in Path("/proc/net/can").glob("rcvlist_*") for line in file.read_text().splitlines())
+
+
+@contextlib.contextmanager
+def recorded(path: Path, *command: object, filters: int = 1) -> Iterator[None]:
+    """A program that records into a file, from the moment its `filters` are in place until its end by Ctrl-C."""
+    before, end = _receivers(), time.monotonic() + WAIT_S
+    with path.open("w") as file:
+        popen = subprocess.Popen([str(c) for c in command], stdout=file, cwd=path.parent)
+        try:
+            while _receivers() < before + filters:
+                assert popen.poll() is None and time.monotonic() < end, f"{command}: not on the bus"
+                time.sleep(0.02)
+            yield
+            time.sleep(0.3)
+        finally:
+            popen.send_signal(signal.SIGINT)
+            popen.wait(WAIT_S)
+
+
 def health(process_: Process) -> dict[str, dict[str, Any]]:
     """Last status line: group -> bus, good, lost, refused."""
     rows = {}

@@ -12,6 +12,7 @@ HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build"
 NODE = {"f32": BUILD / "bin" / "detector_node", "f64": BUILD / "bin" / "detector_node_f64"}
 BUS_TIMER = BUILD / "node" / "bus_timer"
+VIRTUAL_NODE = BUILD / "node" / "virtual_node"
 ORACLE_RUN = BUILD / "oracle" / "oracle_run"
 WITH_VCAN = BUILD / "with-vcan" / "with-vcan"
 # The seed of tests/host when both run in one session.
@@ -41,9 +42,10 @@ def in_guest(*arguments: object, interfaces: int = 1, timeout_s: int = 100) -> l
     return [str(WITH_VCAN), "-n", str(interfaces), "-t", str(timeout_s), *map(str, arguments)]
 
 
-def run_inside(file: str, out: Path, interfaces: int = 1, timeout_s: int = 100) -> None:
-    """Run the tests of a file where vcan0 exists; what fails there fails here, with its text."""
-    options = ["-q", "-rfE", "--tb=short", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--durations=5", f"--basetemp={out}/inside"]
-    done = command(in_guest(sys.executable, "-m", "pytest", *options, HERE / file, interfaces=interfaces, timeout_s=timeout_s), timeout_s + 30)
+def run_inside(*files: str, out: Path, interfaces: int = 1, timeout_s: int = 100) -> str:
+    """Run the tests of files where vcan0 exists, and give what they printed; what fails there fails here, with its text."""
+    options = ["-q", "-rfEP", "--tb=short", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--durations=5", f"--basetemp={out}/inside"]
+    done = command(in_guest(sys.executable, "-m", "pytest", *options, *(HERE / f for f in files), interfaces=interfaces, timeout_s=timeout_s), timeout_s + 30)
     print(done.stdout)
-    assert done.returncode == 0, f"{file} inside with-vcan: exit status {done.returncode}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"
+    assert done.returncode == 0, f"{', '.join(files)} inside with-vcan: exit status {done.returncode}\n{done.stdout[-8000:]}\n{done.stderr[-4000:]}"
+    return done.stdout

@@ -89,8 +89,8 @@ def test_without_a_launcher_auto_is_in_process_and_says_so(tmp_path: Path) -> No
 
 
 def test_processes_on_vcan(tmp_path: Path) -> None:
-    run_inside("process_inside.py", tmp_path, interfaces=2)
+    run_inside("process_inside.py", out=tmp_path, interfaces=2)
 
 
 def test_can_utils(tmp_path: Path) -> None:
-    run_inside("canutils_inside.py", tmp_path)
+    run_inside("canutils_inside.py", out=tmp_path)

@@ -117,6 +117,16 @@ def test_a_dropped_tick_is_an_unexplained_miss(timing_files: Path) -> None:
     assert seen.health("control")[1] == dropped - 1
 
 
+def test_no_deadline_is_noticed_early(timing_files: Path) -> None:
+    """How late is the host's affair, and is printed beside its own lateness: that of a bare timer with the same period."""
+    seen = read(timing_files, "dropped")
+    late = sorted(m.end - m.start for m in seen.misses)
+    assert late and late[0] >= 0
+    wake = seen.watch["longest_wake_us"] - PERIOD_US
+    noticed = f"noticed {late[0]} .. {late[-1]} us late, median {late[len(late) // 2]}"
+    print(f"TIMING {len(late)} missed deadlines at T = {PERIOD_US} us {noticed}; a bare timer beside it up to {wake} us late")
+
+
 def test_the_judge() -> None:
     gap = Span(1_000_000, 1_016_000)
     inside, edge, before, after = Span(1_015_000, 1_016_000), Span(1_026_000, 1_026_500), Span(989_999, 990_100), Span(1_026_001, 1_026_100)

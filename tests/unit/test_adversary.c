@@ -42,8 +42,8 @@ static bool passes_for_new(const record *old)
     const bool stamped = r.rule[old->group].stamp != HG_E2E_NO_STAMP;
     const uint32_t ahead = stamped ? (((uint32_t)old->frame.data[3] - r.node.k) & 15U) : 0U;
     const uint32_t moved = (((counter_of(&r, old->group, &old->frame) + turn) - 1U) - link->receiver.counter) % turn; /* less 1 */
-    if (old->group == C) { /* one old closing frame in a sample, and not one that may be a few ahead */
-        return (!r.node.synchronised) || r.node.slipped || (ahead <= r.node.ahead_max) || (!stamped);
+    if (old->group == C) { /* one that may be a few ahead, or the second one running, as of a sender that began anew, unless a clock tells */
+        return (!r.node.synchronised) || (r.node.slipped && ((!a.clock) || (r.node.k != r.node.slipped_k))) || (ahead <= r.node.ahead_max) || (!stamped);
     }
     return (ahead == 0U) && ((!link->timed) || (moved <= (r.node.k - link->k)));
 }

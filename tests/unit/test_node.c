@@ -1040,12 +1040,47 @@ static void two_ticks_out_of_step_restart_the_detector(void **state)
             assert_status(HG_E_SEQUENCE, give(&r, 1U, k, 641, 0));
             nothing_is_due(&r);
             assert_int_equal(1, hg_node_health(&r.self, 1U)->sequence);
+            if (deadline != 0) {
+                hg_node_overdue(&r.self);
+                step(&r, k);
+            }
             assert_status(HG_OK, give(&r, 1U, k + 1U, 641, 0));
             step(&r, k + 1U);
             nothing_is_due(&r);
             nothing_is_known_but_the_closing_frame(&r);
             assert_int_equal(0, hg_node_health(&r.self, 1U)->late);
             assert_int_equal(0, hg_node_health(&r.self, 1U)->lost); /* nobody knows how many */
+        }
+    }
+}
+
+/* Old closing frames sent once more agree with each other, too; a clock knows that no sample passed between them. */
+static void a_burst_of_old_ticks_does_not_restart_a_node_with_a_clock(void **state)
+{
+    (void)state;
+    for (int clocked = 0; clocked <= 1; clocked++) {
+        static rig r;
+        hg_can_frame old[3] = {{.id = 0U}, {.id = 0U}, {.id = 0U}};
+        begin(&r, HG_START_REST);
+        for (uint32_t k = 0U; k < 20U; k++) {
+            assert_status(HG_OK, give(&r, 0U, k, 0, 0));
+            const hg_can_frame tick = frame_of(&r, 1U, k, 0, 0);
+            if ((k >= 15U) && (k < 18U)) {
+                old[k - 15U] = tick;
+            }
+            assert_status(HG_OK, hg_node_receive(&r.self, &tick));
+            step(&r, k);
+        }
+        if (clocked != 0) {
+            hg_node_expect(&r.self, 0U);
+        }
+        assert_status(HG_E_STAMP, hg_node_receive(&r.self, &old[0]));
+        assert_status((clocked != 0) ? HG_E_STAMP : HG_OK, hg_node_receive(&r.self, &old[1]));
+        if (clocked != 0) {
+            assert_status(HG_E_STAMP, hg_node_receive(&r.self, &old[2]));
+            sample(&r, 20U, 0, 0, 0);
+            assert_int_equal(HG_PLANT_NONE, r.verdict.plant);
+            assert_int_equal(3, hg_node_health(&r.self, 1U)->late);
         }
     }
 }
@@ -1549,6 +1584,7 @@ int main(void)
         cmocka_unit_test(a_sender_that_leaps_or_begins_anew_restarts_the_detector),
         cmocka_unit_test(an_outage_that_is_told_is_no_plant_fault),
         cmocka_unit_test(two_ticks_out_of_step_restart_the_detector),
+        cmocka_unit_test(a_burst_of_old_ticks_does_not_restart_a_node_with_a_clock),
         cmocka_unit_test(who_has_a_clock_refuses_what_comes_too_soon),
         cmocka_unit_test(an_outage_drops_the_steps_that_are_due),
         cmocka_unit_test(no_alarm_is_confirmed_without_a_fault_whatever_the_link_does),

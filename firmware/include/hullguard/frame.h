@@ -49,6 +49,7 @@ typedef struct {                   /* flash: one a message */
     const hg_field      *field;    /* [width] */
     const hg_code_scale *scale;    /* [width] */
     const hg_e2e_config *e2e;      /* protection; the fields stay clear of its places */
+    const uint8_t       *idle;     /* [length] what a sender fills the frame with where no field lies; NULL: 0. Receivers do not look at it */
 } hg_message;
 
 /** Do all fields lie inside the frame and clear of the protection, is the protection valid, can an integer field hold every code of its scale
@@ -59,7 +60,7 @@ bool hg_frame_valid(const hg_message *message);
 /** Has a frame the message's identifier, kind (extended, remote, FD, error) and length? The bit-rate switch is not looked at. */
 bool hg_frame_matches(const hg_message *message, const hg_can_frame *frame);
 
-/** Lay codes into a frame; unused bits are 0, the protection is not written.
+/** Lay codes into a frame; unused bits are idle's, which are 0 in fields and protection, or 0. The protection is not written.
  *  @param[in]  code   [width] within the scale's minimum .. maximum, or HG_CODE_INVALID (anything else is sent as invalid)
  *  Cannot fail for a message that hg_frame_valid() accepts. Cost: a few operations a byte and signal. */
 void hg_frame_pack(const hg_message *message, const int32_t *code, hg_can_frame *frame);

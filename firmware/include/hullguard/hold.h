@@ -5,7 +5,7 @@
  *      j = 0                          half_g                                      quantisation and the rounding of encoder and decoder
  *      j <= silence                   slew_g(j)                                   the sender does not look yet
  *      later                          min(threshold_g resolution_g + half_g, slew_g(j))
- *      a frame is known to be lost    slew_g(j) from the last good frame on       (counter, stamp, checksum, or longer than interval_max)
+ *      a frame is known to be lost    slew_g(j) from the last good frame on       (counter, stamp, checksum, or none when interval_max has passed)
  *      longer than interval_max + margin, never, or sent as invalid:  span_g      stale
  *
  *  A radius that relies on the sender's silence is conditional: a lost frame that shows only later makes it too small in hindsight. Until

@@ -12,8 +12,9 @@
  *  for that (the design's skew). Where a closing frame is missing, too, it may be of a later sample: the detector then begins again, unless the
  *  application's clock has closed the sample in time with hg_node_overdue().
  *  A closing frame j <= 7 ahead makes j steps without it first. One that is late, or whose counter has not moved with its sample, is refused;
- *  two such running that agree with each other are of a sender that began anew or of one this node has lost: the detector restarts at
- *  the sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing frames lost in a row read as fewer,
+ *  two such running that agree with each other (and, where the application has a clock, with the samples it closed as overdue in between:
+ *  old frames sent once more come in a burst) are of a sender that began anew or of one this node has lost: the detector restarts at the
+ *  sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing frames lost in a row read as fewer,
  *  or as none: the application, which has a clock, must have called hg_node_overdue() for each, or call hg_node_outage(). Otherwise an
  *  alarm after such an outage may be false. Closing frames without a stamp are timed by their counter alike.
  *  A link that has seen too many damaged frames is not trusted until good ones came (e2e.h, INVALID). A closing frame that is not, or whose numbers
@@ -115,6 +116,8 @@ typedef struct {                /* RAM: one a node */
     bool            slipped;    /* the last closing frame was refused, late or out of step */
     uint8_t         slipped_counter; /* its sequence counter */
     uint8_t         slipped_stamp;   /* and its stamp */
+    uint32_t        slipped_k;  /* the sample that was open then */
+    bool            clocked;    /* the application has a clock: it has called hg_node_overdue() or hg_node_expect() */
     bool            closed;     /* has a closing frame been accepted? */
     uint8_t         closing_counter; /* the last accepted one's sequence counter */
     uint32_t        closing_k;  /* and its sample */

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import logging
 import socket
+import struct
 import sys
 import time
 from collections.abc import Iterator
@@ -15,12 +16,14 @@ import can
 
 from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE
 from hullguard.core.native import Frame
+from hullguard.design.tables import FD_LENGTHS
 from hullguard.errors import BusError
 
 logging.getLogger("can").addHandler(logging.NullHandler())  # what goes wrong comes as an exception and is told in one line
 RECEIVE_BUFFER = 4 << 20  # bytes; python-can's default holds 278 frames, and the system's limit without privilege twice that
 SO_RCVBUFFORCE = 33  # Linux; Python has no name for it
 SEND_PATIENCE_S = 1.0
+EXTENDED_BIT, CANFD_BRS = 0x80000000, 0x01  # linux/can.h
 
 
 def to_message(frame: Frame) -> can.Message:
@@ -32,6 +35,7 @@ def to_message(frame: Frame) -> can.Message:
         is_remote_frame=bool(frame.flags & REMOTE),
         is_fd=bool(frame.flags & FD),
         bitrate_switch=bool(frame.flags & BRS),
+        is_error_frame=bool(frame.flags & ERROR),
     )
 
 
@@ -48,7 +52,8 @@ class CanLink:
 
     def __init__(self, bus: can.BusABC) -> None:
         self.bus = bus
-        self.channel = str(getattr(bus, "channel", "can0"))
+        channel = getattr(bus, "channel", "can0")
+        self.channel = channel if isinstance(channel, str) else bus.channel_info
         raw = getattr(bus, "socket", None)
         if isinstance(raw, socket.socket):
             for option in (socket.SO_RCVBUF, SO_RCVBUFFORCE) if sys.platform == "linux" else (socket.SO_RCVBUF,):
@@ -60,7 +65,7 @@ class CanLink:
         end = time.monotonic() + SEND_PATIENCE_S
         while True:
             try:
-                self.bus.send(to_message(frame))
+                self._put(frame)
                 return
             except can.CanOperationError as error:
                 full = getattr(error, "error_code", None) == errno.ENOBUFS
@@ -68,6 +73,20 @@ class CanLink:
                     cure = "raise its txqueuelen" if full else "is the interface up?"
                     raise BusError(f"cannot send on {self.channel}: {error}; {cure}") from error
                 time.sleep(0.0005)
+
+    def _put(self, frame: Frame) -> None:
+        if not frame.flags & FD or len(frame.data) in FD_LENGTHS:
+            self.bus.send(to_message(frame))
+            return
+        # python-can would fill it up to the next length that CAN FD can say; Linux takes it as it is.
+        raw = getattr(self.bus, "socket", None)
+        if not isinstance(raw, socket.socket):
+            raise BusError(f"{len(frame.data)} bytes of data cannot be sent on {self.channel}: CAN FD has no such length; use socketcan, or one of {FD_LENGTHS[9:]}")
+        number = frame.id | (EXTENDED_BIT if frame.flags & EXTENDED else 0)
+        try:
+            raw.send(struct.pack("=IBBxx64s", number, len(frame.data), CANFD_BRS if frame.flags & BRS else 0, frame.data))
+        except OSError as error:
+            raise can.CanOperationError(str(error), error.errno) from error
 
     def receive(self, timeout_s: float) -> tuple[Frame, float] | None:
         """The next frame and its time stamp, or None when none comes in time."""

@@ -197,7 +197,7 @@ def _kind(g: GroupTable, closes: bool) -> str:
     """When a group's frame is sent."""
     if closes:
         return "closes the sample"
-    return "event" if g.interval_max > 1 else "periodic"
+    return "periodic" if g.periodic else "event"
 
 
 def _header(design: Design, names: Names) -> str:
@@ -288,6 +288,8 @@ def _group(g: GroupTable, n: str) -> list[str]:
         lines += [_field(s) for s in g.signals] + ["};", ""]
     shape = f"{g.levels}][{width}"
     lines += _protection(g.message.protection, n)
+    if g.message.idle:
+        lines += table("uint8_t", f"{n}_idle", f"{g.message.length}", [octets(g.message.idle)], "what fills the frame where none of these signals lies")
     lines += table("uint8_t", f"{n}_silence", f"{g.levels}", [unsigned(g.silence)], "samples after a frame in which the sender does not speak, by level")
     lines += table("uint16_t", f"{n}_delta", shape, [unsigned(r) for r in g.delta], "relative threshold, 1/65536, by level and signal")
     lines += table("int32_t", f"{n}_sigma", shape, [signed(r) for r in g.sigma], "absolute threshold, codes, by level and signal")
@@ -326,7 +328,7 @@ def _message(m: MessageTable, n: str, width: int, indent: str = "    ") -> list[
     field, scale = (f"{n}_field", f"{n}_scale") if width else ("NULL", "NULL")
     return [
         f"{indent}{{.id = 0x{m.id:X}UL, .flags = {flags(m.flags, CAN_FLAGS)}, .length = {m.length}U, .width = {width}U,",
-        f"{indent} .field = {field}, .scale = {scale}, .e2e = &{n}_e2e}},",
+        f"{indent} .field = {field}, .scale = {scale}, .e2e = &{n}_e2e{f', .idle = {n}_idle' if m.idle else ''}}},",
     ]
 
 

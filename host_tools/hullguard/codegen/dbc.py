@@ -13,6 +13,7 @@ import numpy as np
 
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.design import Design
+from hullguard.design.protection import MODES, NO_STAMP, NONE, PROFILES, ProtectionTable
 from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, NARROW_FAULTS, SIGNED, GroupTable, MessageTable, SignalTable
 from hullguard.errors import InputError
 
@@ -21,7 +22,14 @@ DETECTOR = "detector"
 NOBODY = "Vector__XXX"
 SEND_TYPES = ("Cyclic", "Event", "NoMsgSendType")
 FRAME_FORMATS = ("StandardCAN", "ExtendedCAN", *(f"reserved{i}" for i in range(2, 14)), "StandardCAN_FD", "ExtendedCAN_FD")
-PROTECTIONS = ("None", "P22")
+PROTECTIONS = tuple("None" if p == NONE else p for p in PROFILES)
+CRC_ABOUT = {
+    "P01": "CRC-8 (SAE J1850) over the data identifier and all other bytes",
+    "P02": "CRC-8H2F over all other bytes and the data identifier of the counter's value",
+    "P05": "CRC-16 (CCITT) over all other bytes and the data identifier, low byte first",
+    "P11": "CRC-8 (SAE J1850) over the data identifier and all other bytes",
+    "P22": "CRC-8H2F over bytes 1 .. end and the data identifier of the counter's value",
+}
 
 PLANT = {0: "starting", 1: "none", 2: "provisional", 3: "confirmed"}
 BASIS = {0: "unset", 1: "set", 2: "statistical"}
@@ -96,13 +104,15 @@ def _symbol(name: str) -> str:
     return name
 
 
-def _header(about_stamp: str) -> tuple[Entry, ...]:
-    """The fields of protection profile 22."""
-    return (
-        Entry("E2E_CRC", 0, 8, high=255, about="CRC-8H2F over bytes 1 .. end and the data identifier of the counter's value"),
-        Entry("E2E_counter", 8, 4, high=15, about="Sequence counter of this message's frames"),
-        Entry("E2E_stamp", 12, 4, high=15, about=about_stamp),
-    )
+def _header(p: ProtectionTable, about_stamp: str) -> tuple[Entry, ...]:
+    """The fields of a message's protection."""
+    about = {
+        "crc": ("E2E_CRC", CRC_ABOUT.get(p.profile, "")),
+        "counter": ("E2E_counter", "Sequence counter of this message's frames"),
+        "nibble": ("E2E_data_id", f"Bits 11 .. 8 of the data identifier: {p.data_id >> 8}"),
+        "stamp": ("E2E_stamp", about_stamp),
+    }
+    return tuple(Entry(about[what][0], first, bits, high=(1 << bits) - 1, about=about[what][1]) for what, (first, bits) in p.places.items())
 
 
 def _entry(s: SignalTable, name: str) -> Entry:
@@ -136,6 +146,8 @@ def _group_about(g: GroupTable, closes: bool) -> str:
         return "Sent with every sample, after all others of the sample: it closes the sample."
     if g.interval_max == 1:
         return "Sent with every sample."
+    if g.periodic:
+        return f"Sent every {g.interval_max} samples."
     return f"Sent when a value has moved far enough, at least every {g.interval_max} samples; silence is information."
 
 
@@ -148,8 +160,8 @@ def _group(design: Design, place: int, names: Names) -> Message:
         name=_symbol(n),
         sender=_sender(n),
         receivers=(DETECTOR,),
-        entries=(*_header("Sample index modulo 16 that the frame belongs to"), *entries),
-        send_type="Event" if g.interval_max > 1 else "Cyclic",
+        entries=(*_header(g.message.protection, "Sample index modulo 16 that the frame belongs to"), *entries),
+        send_type="Cyclic" if g.periodic else "Event",
         cycle_ms=_cycle_ms(design, g.interval_max),
         about=_group_about(g, place == design.tables.closing),
     )
@@ -185,7 +197,7 @@ def _verdict(design: Design, names: Names, senders: tuple[str, ...]) -> Message:
         name=design.tables.verdict.name,
         sender=DETECTOR,
         receivers=senders,
-        entries=(*_header("Low 4 bits of the sample index that the verdict speaks of"), *entries),
+        entries=(*_header(design.tables.verdict.protection, "Low 4 bits of the sample index that the verdict speaks of"), *entries),
         send_type="Event",
         cycle_ms=_cycle_ms(design, design.tables.heartbeat),
         about="Sent when the verdict changes, and as a heartbeat.",
@@ -203,7 +215,7 @@ def _status(design: Design, senders: tuple[str, ...]) -> Message:
         name=design.tables.status.name,
         sender=DETECTOR,
         receivers=senders,
-        entries=(*_header("Low 4 bits of the sample index"), *entries),
+        entries=(*_header(design.tables.status.protection, "Low 4 bits of the sample index"), *entries),
         send_type="Cyclic",
         cycle_ms=_cycle_ms(design, design.tables.heartbeat),
         about="Sent with every heartbeat of the verdict.",
@@ -252,7 +264,8 @@ def _enumeration(names: Iterable[str]) -> str:
     return "ENUM " + ",".join(quoted(n) for n in names)
 
 
-def _attribute_definitions() -> list[str]:
+def _attribute_definitions(any_fd: bool) -> list[str]:
+    fast = ['BA_DEF_ "BaudrateCANFD" INT 0 20000000;', 'BA_DEF_DEF_ "BaudrateCANFD" 0;'] if any_fd else []
     return [
         'BA_DEF_ "BusType" STRING ;',
         'BA_DEF_ "Baudrate" INT 0 8000000;',
@@ -266,8 +279,16 @@ def _attribute_definitions() -> list[str]:
         f'BA_DEF_ BO_ "CANFD_BRS" {_enumeration(("0", "1"))};',
         f'BA_DEF_ BO_ "E2EProfile" {_enumeration(PROTECTIONS)};',
         'BA_DEF_ BO_ "E2EDataIdList" STRING ;',
+        'BA_DEF_ BO_ "E2EDataId" INT 0 65535;',
+        f'BA_DEF_ BO_ "E2EDataIdMode" {_enumeration(MODES)};',
+        'BA_DEF_ BO_ "E2ECrcByte" INT 0 63;',
+        'BA_DEF_ BO_ "E2ECounterBit" INT 0 511;',
+        'BA_DEF_ BO_ "E2ENibbleBit" INT 0 511;',
+        'BA_DEF_ BO_ "E2EStampBit" INT -1 511;',
+        *fast[:1],
         'BA_DEF_DEF_ "BusType" "CAN";',
         'BA_DEF_DEF_ "Baudrate" 500000;',
+        *fast[1:],
         'BA_DEF_DEF_ "HullguardModel" "";',
         'BA_DEF_DEF_ "HullguardModelSha256" "";',
         'BA_DEF_DEF_ "HullguardModelHash" "";',
@@ -278,6 +299,12 @@ def _attribute_definitions() -> list[str]:
         'BA_DEF_DEF_ "CANFD_BRS" "0";',
         'BA_DEF_DEF_ "E2EProfile" "None";',
         'BA_DEF_DEF_ "E2EDataIdList" "";',
+        'BA_DEF_DEF_ "E2EDataId" 0;',
+        f'BA_DEF_DEF_ "E2EDataIdMode" {quoted(MODES[0])};',
+        'BA_DEF_DEF_ "E2ECrcByte" 0;',
+        'BA_DEF_DEF_ "E2ECounterBit" 8;',
+        'BA_DEF_DEF_ "E2ENibbleBit" 0;',
+        'BA_DEF_DEF_ "E2EStampBit" -1;',
     ]
 
 
@@ -287,6 +314,7 @@ def _attributes(design: Design, made: Sequence[Message]) -> list[str]:
     lines = [
         f'BA_ "BusType" {quoted("CAN FD" if any_fd else "CAN")};',
         f'BA_ "Baudrate" {model.bitrate_bps};',
+        *([f'BA_ "BaudrateCANFD" {model.data_bitrate_bps};'] if any_fd else []),
         f'BA_ "HullguardModel" {quoted(tables.name)};',
         f'BA_ "HullguardModelSha256" {quoted(model.sha256)};',
         f'BA_ "HullguardModelHash" "0x{tables.hash:08X}";',
@@ -299,10 +327,24 @@ def _attributes(design: Design, made: Sequence[Message]) -> list[str]:
             f'BA_ "GenMsgCycleTime" BO_ {m.id} {m.cycle_ms};',
             f'BA_ "VFrameFormat" BO_ {m.id} {format_};',
             f'BA_ "CANFD_BRS" BO_ {m.id} {1 if m.table.flags & BRS else 0};',
-            f'BA_ "E2EProfile" BO_ {m.id} {PROTECTIONS.index("P22")};',
-            f'BA_ "E2EDataIdList" BO_ {m.id} {quoted(" ".join(f"{i:02X}" for i in m.table.protection.data_ids))};',
+            *_protection(m),
         ]
     return lines
+
+
+def _protection(m: Message) -> list[str]:
+    """All that model/network.py needs to read the protection back."""
+    p = m.table.protection
+    return [
+        f'BA_ "E2EProfile" BO_ {m.id} {PROFILES.index(p.profile)};',
+        f'BA_ "E2EDataIdList" BO_ {m.id} {quoted(" ".join(f"{i:02X}" for i in p.data_ids))};',
+        f'BA_ "E2EDataId" BO_ {m.id} {p.data_id};',
+        f'BA_ "E2EDataIdMode" BO_ {m.id} {MODES.index(p.mode)};',
+        f'BA_ "E2ECrcByte" BO_ {m.id} {p.crc};',
+        f'BA_ "E2ECounterBit" BO_ {m.id} {p.counter};',
+        f'BA_ "E2ENibbleBit" BO_ {m.id} {p.nibble};',
+        f'BA_ "E2EStampBit" BO_ {m.id} {-1 if p.stamp == NO_STAMP else p.stamp};',
+    ]
 
 
 def emit_dbc(design: Design) -> str:
@@ -312,7 +354,7 @@ def emit_dbc(design: Design) -> str:
     lines = ['VERSION ""', "", "NS_ :", *(f"\t{s}" for s in SYMBOLS.split()), "", "BS_:", "", "BU_: " + " ".join(senders), ""]
     for m in made:
         lines += _message_lines(m)
-    lines += ["", *_comments(design, made), *_attribute_definitions(), *_attributes(design, made)]
+    lines += ["", *_comments(design, made), *_attribute_definitions(any(m.table.flags & FD for m in made)), *_attributes(design, made)]
     for m in made:
         for e in m.entries:
             if e.values:

@@ -6,6 +6,7 @@ typedef struct {
     uint32_t run;
     uint32_t last; /* 2: none yet */
     uint32_t crc;
+    bool     stuffed; /* was the last bit followed by a stuff bit? */
 } wire;
 
 static void put(wire *w, uint32_t bit)
@@ -16,7 +17,8 @@ static void put(wire *w, uint32_t bit)
     w->run = (bit == w->last) ? w->run + 1U : 1U;
     w->last = bit;
     w->count++;
-    if (w->run == 5U) {
+    w->stuffed = (w->run == 5U);
+    if (w->stuffed) {
         w->count++;
         w->last = 1U - bit;
         w->run = 1U;
@@ -43,37 +45,64 @@ static uint32_t length_code(uint32_t length)
     return code;
 }
 
-uint32_t hgh_frame_bits(const hg_can_frame *frame)
+/* Start of frame to data length code; the bits up to and with the one that switches the bit rate. */
+static uint32_t put_header(wire *w, const hg_can_frame *frame, bool fd, bool remote)
 {
-    const bool fd = (frame->flags & HG_CAN_FD) != 0U;
-    const bool remote = (frame->flags & HG_CAN_REMOTE) != 0U;
-    wire w = {.count = 0U, .run = 0U, .last = 2U, .crc = 0U};
-    put(&w, 0U);
+    uint32_t nominal = 0U;
+    put(w, 0U);
     if ((frame->flags & HG_CAN_EXTENDED) != 0U) {
-        put_bits(&w, frame->id >> 18, 11U);
-        put_bits(&w, 3U, 2U); /* SRR, IDE */
-        put_bits(&w, frame->id & 0x3FFFFU, 18U);
-        put(&w, (remote && !fd) ? 1U : 0U);
-        put_bits(&w, fd ? 2U : 0U, 2U); /* FDF and reserved, or r1 r0 */
+        put_bits(w, frame->id >> 18, 11U);
+        put_bits(w, 3U, 2U); /* SRR, IDE */
+        put_bits(w, frame->id & 0x3FFFFU, 18U);
+        put(w, remote ? 1U : 0U);
+        put_bits(w, fd ? 2U : 0U, 2U); /* FDF and reserved, or r1 r0 */
     } else {
-        put_bits(&w, frame->id, 11U);
-        put(&w, (remote && !fd) ? 1U : 0U);
-        put(&w, 0U); /* IDE */
-        put_bits(&w, fd ? 2U : 0U, fd ? 2U : 1U);
+        put_bits(w, frame->id, 11U);
+        put(w, remote ? 1U : 0U);
+        put(w, 0U); /* IDE */
+        put_bits(w, fd ? 2U : 0U, fd ? 2U : 1U);
     }
     if (fd) {
-        put(&w, ((frame->flags & HG_CAN_BRS) != 0U) ? 1U : 0U);
-        put(&w, 0U); /* ESI */
+        nominal = w->count + 1U; /* a stuff bit behind the switch is a fast one */
+        put(w, ((frame->flags & HG_CAN_BRS) != 0U) ? 1U : 0U);
+        put(w, 0U); /* ESI */
     }
-    put_bits(&w, length_code(frame->length), 4U);
+    put_bits(w, length_code(frame->length), 4U);
+    return nominal;
+}
+
+/* Bits of the frame, and of these the ones of the data phase. The rate changes at the sample points of BRS and CRC delimiter; as their fast
+   and slow parts complement one another, that is one slow bit (BRS) and one fast bit (the delimiter) for any sample points. */
+static uint32_t measure(const hg_can_frame *frame, uint32_t *fast)
+{
+    const bool fd = (frame->flags & HG_CAN_FD) != 0U;
+    const bool remote = ((frame->flags & HG_CAN_REMOTE) != 0U) && !fd;
+    wire w = {.count = 0U, .run = 0U, .last = 2U, .crc = 0U, .stuffed = false};
+    const uint32_t nominal = put_header(&w, frame, fd, remote);
     for (uint32_t i = 0U; (i < frame->length) && !remote; i++) {
         put_bits(&w, frame->data[i], 8U);
     }
+    *fast = 0U;
     if (fd) {
         const bool small = frame->length <= 16U;
+        w.count -= w.stuffed ? 1U : 0U; /* the fixed stuff bit that follows stands for it (ISO 11898-1, frame coding) */
         w.count += 4U + (small ? 17U + 6U : 21U + 7U); /* stuff count, CRC, and their fixed stuff bits */
+        *fast = ((frame->flags & HG_CAN_BRS) != 0U) ? (w.count + 1U - nominal) : 0U;
     } else {
         put_bits(&w, w.crc, 15U);
     }
     return w.count + 13U; /* delimiters, acknowledge, end of frame, interframe space */
+}
+
+uint32_t hgh_frame_bits(const hg_can_frame *frame)
+{
+    uint32_t fast;
+    return measure(frame, &fast);
+}
+
+uint32_t hgh_frame_data_bits(const hg_can_frame *frame)
+{
+    uint32_t fast;
+    (void)measure(frame, &fast);
+    return fast;
 }

@@ -185,4 +185,7 @@ int64_t hgh_sweep(const hgh_run_config *config, const hgh_fault *fault, int32_t 
 /** Bits on the wire with stuff bits and interframe space, exact; nominal and data phase together for FD. */
 uint32_t hgh_frame_bits(const hg_can_frame *frame);
 
+/** Of these, the bits at the data bit rate: ESI to CRC delimiter of an FD frame that switches, else 0. */
+uint32_t hgh_frame_data_bits(const hg_can_frame *frame);
+
 #endif

@@ -92,6 +92,8 @@ class Native:
         m.id, m.flags, m.length, m.width = table.id, table.flags, table.length, len(signals)
         m.e2e, kept = protection(self.library, table.protection)
         self._keep += kept
+        if table.idle:
+            m.idle = self._ints("uint8_t", table.idle)
         if g is None:
             return
         fields, scales = self._new("hg_field[]", len(signals) or 1), self._new("hg_code_scale[]", len(signals) or 1)
@@ -191,6 +193,11 @@ def frame_in(library: Library, frame: Frame) -> Any:
 def frame_bits(library: Library, frame: Frame) -> int:
     """Bits on the wire, exact."""
     return int(library.lib.hgh_frame_bits(frame_in(library, frame)))
+
+
+def data_bits(library: Library, frame: Frame) -> int:
+    """Of these, the ones at the data bit rate, exact: 0 unless an FD frame switches."""
+    return int(library.lib.hgh_frame_data_bits(frame_in(library, frame)))
 
 
 @dataclass(frozen=True)

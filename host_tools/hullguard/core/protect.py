@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hullguard.core.library import Library
@@ -41,8 +41,9 @@ class Protector:
 
     def __init__(self, library: Library, table: ProtectionTable) -> None:
         self._ffi, self._lib = library.ffi, library.lib
-        self._stamped = table.stamped
+        self.table = table
         self._config, self._keep = protection(library, table)
+        self._blind, self._kept = protection(library, replace(table, ignore=("crc",)))
         self.modulus = int(self._lib.hg_e2e_modulus(self._config))
 
     def protect(self, data: bytes, counter: int, stamp: int) -> bytes:
@@ -52,9 +53,15 @@ class Protector:
             raise ValueError(f"{len(data)} bytes cannot hold this protection")
         return bytes(self._ffi.buffer(made, len(data)))
 
+    def sum(self, data: bytes) -> bytes:
+        """The data with their checksum renewed; counter and stamp are those in place."""
+        header = self._ffi.new("hg_e2e_header *")
+        self._lib.hg_e2e_check(self._blind, data, len(data), header)
+        return self.protect(data, int(header.counter), int(header.stamp))
+
     def check(self, data: bytes) -> Header | None:
         """What the header says; None for a damaged frame or one of a wrong length."""
         header = self._ffi.new("hg_e2e_header *")
         if self._lib.hg_e2e_check(self._config, data or b"\0", len(data), header) != self._lib.HG_OK:
             return None
-        return Header(int(header.counter), int(header.stamp) if self._stamped else None)
+        return Header(int(header.counter), int(header.stamp) if self.table.stamped else None)

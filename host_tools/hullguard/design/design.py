@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 
 import numpy as np
 
@@ -14,13 +15,15 @@ from hullguard.design.arith import digits, mul, row_sums, up32
 from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
+from hullguard.design.ids import ERRORS, POLYNOMIAL, SURE, undetected_patterns
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure, weighted
 from hullguard.design.predict import Bounds, predict_table, predicted_groups
+from hullguard.design.protection import LISTED, NONE
 from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
-from hullguard.design.tables import GeneratorTable, GroupTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
+from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
 from hullguard.design.window import Varying, varying_states
 from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
@@ -79,14 +82,21 @@ class Design:
         return names
 
 
-def usual_radius(model: Model) -> Array:
-    """Radius that each signal of the vector has most of the time: its trigger's, at half its activity scale, or its quantisation."""
+def usual_radius(model: Model, slew: Array | None = None) -> Array:
+    """Radius that each signal of the vector has most of the time: its trigger's, at half its activity scale, or its quantisation.
+
+    A periodic sender's is as wide as half its period and its skew let the signal move: `slew` (signals x horizon), or else what is declared.
+    """
     radius = np.zeros(len(model.signals))
     for g in model.groups:
         t = g.trigger
         for place, i in enumerate(g.signals):
             s = model.signals[i]
-            if t.interval_max > 1:
+            age = t.interval_max // 2 + g.skew if t.periodic else 0
+            if age:
+                known = slew[i] if slew is not None else np.array(s.slew or (s.resolution,))
+                radius[i] = s.resolution / 2 + float(known[min(age, len(known)) - 1])
+            elif t.interval_max > 1:
                 radius[i] = float((t.sigma[:, place] + t.delta[:, place] * s.scale / 2).max())
             elif not g.applied_as_sent:
                 radius[i] = s.resolution / 2
@@ -165,7 +175,7 @@ def check_observable(model: Model) -> None:
 def find(model: Model, tick: Tick) -> Stored:
     """All that needs a search or a solver, rounded for the design file."""
     check_observable(model)
-    horizon = max(g.trigger.interval_max + g.trigger.margin for g in model.groups)
+    horizon = max(g.horizon for g in model.groups)
     plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B), dA=digits(model.plant.dA), dB=digits(model.plant.dB))
     if plant.feedback is not None:
         plant = replace(plant, feedback=Feedback(digits(plant.feedback.gain), plant.feedback.reference_bound))
@@ -175,7 +185,7 @@ def find(model: Model, tick: Tick) -> Stored:
         # A hypothesis must not be excluded because its fault moves the plant faster than a healthy one moves.
         reached = replace(faulty_reach(model, reached), signal=reached.signal)
     model = _disturbed(model, reached.state, reached.signal)
-    radius = usual_radius(model)
+    radius = usual_radius(model, reached.slew)
     observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
     spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
@@ -201,7 +211,7 @@ def refilter(model: Model, old: Stored) -> Stored:
     """A stored design for a model whose triggers, bounds or ranges have changed: parity vectors and poles stay, the rest is made anew."""
     fresh = replace(model, observers=())
     found = find(fresh, lambda *_: None)
-    radius = usual_radius(model)
+    radius = usual_radius(model, found.slew)
     same = _disturbed(replace(model, plant=replace(model.plant, A=found.A, B=found.B)), found.state_range, found.signal_reach)
     observers = []
     for i, (spec, stored) in enumerate(zip(model.observers, old.observers, strict=True)):
@@ -263,7 +273,7 @@ def finish(model: Model, stored: Stored) -> Design:
     generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers)))
     tables = _tables(model, groups, generators, derived, _banks(model, stored, derived))
     _unique_ids(model, tables)
-    bound = load_bound(tables, model.bitrate_bps, model.sample_time_s)
+    bound = load_bound(tables, model.bitrate_bps, model.sample_time_s, model.data_bitrate_bps)
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
@@ -271,12 +281,15 @@ def finish(model: Model, stored: Stored) -> Design:
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:
-    messages = [g.message for g in tables.groups] + [tables.verdict, tables.status]
-    for a in messages:
-        for b in messages:
-            if a is not b and a.protection.data_ids and a.protection.data_ids == b.protection.data_ids:
-                byte = a.protection.data_ids[0]
-                raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that fold to the same byte 0x{byte:02X}; give one another data_id")
+    """Refuse two messages that a checksum cannot tell apart. Those of a vehicle are as they are."""
+    vehicles = {g.name for g in model.groups if g.frame.wire is not None}
+    messages = [m for m in ([g.message for g in tables.groups] + [tables.verdict, tables.status]) if m.protection.profile != NONE]
+    for a, b in combinations(messages, 2):
+        p, q = a.protection, b.protection
+        if {a.name, b.name} <= vehicles or POLYNOMIAL[p.profile] != POLYNOMIAL[q.profile] or (p.data_ids, p.data_id) != (q.data_ids, q.data_id):
+            continue
+        same = f"fold to the same byte 0x{p.data_ids[0]:02X}" if p.data_ids else f"are the same, 0x{p.data_id:X}"
+        raise InputError(f"{model.path.name}: messages '{a.name}' and '{b.name}' have data ids that {same}; give one another data_id")
 
 
 def _disturbed(model: Model, state: Array, signal: Array) -> Model:
@@ -298,7 +311,7 @@ class Derived:
 
 
 def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> Derived:
-    usual, place = usual_radius(model), {}
+    usual, place = usual_radius(model, stored.slew), {}
     values = np.array([largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
     spread = constant_mismatch(model, stored.state_range, values)
     bounds = Bounds(stored.state_range, values[model.inputs], spread)
@@ -313,7 +326,7 @@ def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> De
         return Derived(predictors, place, None, (), (), usual, np.zeros(0))
     table, states = mismatch_table(model, stored.state_range)
     scale = np.array([s.scale for s in model.signals]) / 2  # what a signal usually is, as for its trigger
-    own = np.array(table.constant) + mul(np.array(table.gain), (scale + usual_radius(model))[list(table.signal), None])[:, 0]
+    own = np.array(table.constant) + mul(np.array(table.gain), (scale + usual_radius(model, stored.slew))[list(table.signal), None])[:, 0]
     places = tuple(range(len(usual), len(usual) + len(states)))
     return Derived(predictors, place, table, places, states, np.concatenate([usual, own]), spread[list(states)])
 
@@ -475,8 +488,21 @@ def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, ge
         share = float((g.tables.rounding / g.tables.steady).max())
         checks.append(Check(f"rounding share of threshold {i + 1}", share, 0.5, "choose poles further inside the unit circle, or narrower ranges"))
     for group in tables.groups:
-        checks.append(Check(f"counter alias of {group.name}", group.interval_max + group.margin, 16 * (min(group.silence) + 1) - 1, "shorten interval_max or margin"))
-    return checks
+        modulus = group.message.protection.modulus
+        if modulus:
+            checks.append(Check(f"counter alias of {group.name}", group.interval_max + group.margin, modulus * (min(group.silence) + 1) - 1, "shorten interval_max or margin"))
+    return checks + [c for m in (*(g.message for g in tables.groups), tables.verdict, tables.status) for c in _protection_checks(model, m)]
+
+
+def _protection_checks(model: Model, m: MessageTable) -> list[Check]:
+    """How many errors of up to three bits the checksum of a frame does not see; none, where the profile can do that and the design chose its identifiers."""
+    if m.protection.profile == NONE:
+        return []
+    count = undetected_patterns(m.protection, m.length)
+    chosen = all(g.name != m.name or g.frame.wire is None for g in model.groups)
+    sure = chosen and (m.protection.profile == "P05" or (m.protection.profile in LISTED and m.length <= SURE))
+    name = f"undetected errors of up to {ERRORS} bits in {m.name}, {m.protection.profile}, {m.length} bytes"
+    return [Check(name, count, 0 if sure else count, "choose other data ids")]
 
 
 def design(model: Model, fresh: bool = False, tick: Tick | None = None, workers: int = 1) -> tuple[Design, bool]:

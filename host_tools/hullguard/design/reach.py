@@ -249,7 +249,7 @@ def _sums(A: Array, Bw: Array, Cs: Array, Dw: Array, initial: Array, horizon: in
         extended = np.concatenate([h, np.zeros((j, *Dw.shape))])
         # Row k + j: everything that w(0) .. w(k + j) can do to s(k + j) - s(k).
         driven = np.abs(extended - shifted).sum(2).cumsum(0)[j:]
-        later = np.concatenate([x0[j:], np.zeros((j, *x0.shape[1:]))])
+        later = np.concatenate([x0[j:], np.zeros((min(j, len(x0)), *x0.shape[1:]))])
         slew[:, j - 1] = (driven + np.abs(later - x0).sum(2)).max(0)
     return state, signal, slew
 

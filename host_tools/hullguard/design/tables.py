@@ -5,25 +5,27 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hullguard.design.arith import U32, nearest32, up32
 from hullguard.design.bank_types import BankTable
-from hullguard.design.protection import ProtectionTable, own_protection
+from hullguard.design.ids import SURE
+from hullguard.design.protection import NONE, ProtectionTable, own_protection
 from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError
+from hullguard.model.network import Field
 from hullguard.model.schema import Frame, Group, Model, Signal
 from hullguard.model.table import Array
 
 CODE_BITS_MAX = 24  # float32 holds every code of that many bits exactly
 EXTENDED, FD, BRS = 0x01, 0x04, 0x08
 MOTOROLA, SIGNED, FLOAT32 = 0x01, 0x02, 0x04
-HEADER_BITS = 16
 CLASSIC_MAX = 8
 FD_LENGTHS = (*range(CLASSIC_MAX + 1), 12, 16, 20, 24, 32, 48, 64)
+USUAL, LONG = "P22", "P05"  # profiles of frames of up to 12 bytes and of longer ones
 NARROW_FAULTS = 16  # candidates in a verdict frame of 8 bytes; one of 12 holds the rest
 
 
@@ -55,6 +57,7 @@ class MessageTable:
     flags: int
     length: int
     protection: ProtectionTable
+    idle: tuple[int, ...] = ()  # the frame's bytes where no field lies; () where they are 0
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,11 @@ class GroupTable:
     sigma: tuple[tuple[int, ...], ...]
     activity: tuple[tuple[int, ...], ...]
     slew: tuple[tuple[float, ...], ...]  # interval_max + margin x width
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the sender speaks every interval_max samples, whatever its signals do."""
+        return min(self.silence) + 1 >= self.interval_max
 
 
 @dataclass(frozen=True)
@@ -255,7 +263,36 @@ def signal_table(s: Signal, start: int, exact: bool) -> SignalTable:
     )
 
 
-def message_table(name: str, frame: Frame, length: int) -> MessageTable:
+def field_table(s: Signal, field: Field, exact: bool) -> SignalTable:
+    """Codes and the wire of one signal where a vehicle's frame has it. `exact` as in signal_table()."""
+    resolution, offset = float(nearest32(np.array(s.resolution))), 0.0 if field.is_float else float(nearest32(np.array(field.offset)))
+    zero = 0.0 if field.is_float else field.offset
+    minimum, maximum = round((s.low - zero) / s.resolution), round((s.high - zero) / s.resolution)
+    if max(abs(minimum), abs(maximum)).bit_length() > CODE_BITS_MAX:
+        raise InputError(
+            f"signal '{s.name}': {s.low:g} .. {s.high:g} is raw {minimum} .. {maximum} of '{field.name}', beyond {CODE_BITS_MAX} bits, which float32 would round; "
+            "give it a narrower range"
+        )
+    # Encoder, decoder and reading in float32, and the database's factor and offset as float32 tables have them.
+    rounding = 16 * U32 * (max(abs(s.low), abs(s.high)) + abs(offset))
+    return SignalTable(
+        name=s.name,
+        resolution=resolution,
+        offset=offset,
+        per_unit=float(nearest32(np.array(1.0 / resolution))),
+        minimum=minimum,
+        maximum=maximum,
+        start=field.start,
+        length=field.length,
+        flags=(MOTOROLA if field.motorola else 0) | (FLOAT32 if field.is_float else SIGNED if field.is_signed else 0),
+        half=float(up32(np.array(rounding if exact else resolution / 2 + rounding))),
+        span=float(up32(np.array((s.high - s.low) * (1 + 4 * U32) + resolution + 2 * rounding))),
+        middle=float(nearest32(np.array((s.low + s.high) / 2))),
+        zero=round(-offset / resolution),
+    )
+
+
+def message_table(name: str, frame: Frame, length: int, protection: ProtectionTable | None = None) -> MessageTable:
     """hg_message; CAN FD where the model asks for it or says nothing and a classic frame is too short. A length that FD cannot carry is rounded up."""
     fd = length > CLASSIC_MAX if frame.fd is None else frame.fd
     most = FD_LENGTHS[-1] if fd else CLASSIC_MAX
@@ -265,7 +302,31 @@ def message_table(name: str, frame: Frame, length: int) -> MessageTable:
     if fd:
         length = next(n for n in FD_LENGTHS if n >= max(length, CLASSIC_MAX))
     flags = (EXTENDED if frame.extended else 0) | ((FD | BRS) if fd else 0)
-    return MessageTable(name, frame.id, flags, length, own_protection("P22", "both", frame.data_id)[0])
+    return MessageTable(name, frame.id, flags, length, protection or own_protection(frame.profile or USUAL, frame.mode, frame.data_id)[0])
+
+
+def _own_layout(model: Model, group: Group, profile: str) -> tuple[list[SignalTable], ProtectionTable, int]:
+    """Signals, protection and bytes of a frame of the project's own layout: one signal behind another."""
+    protection, place = own_protection(profile, group.frame.mode, group.frame.data_id)
+    signals = []
+    for i in group.signals:
+        s = signal_table(model.signals[i], place, group.applied_as_sent)
+        signals.append(s)
+        place += s.length
+    return signals, protection, (place + 7) // 8
+
+
+def _layout(model: Model, group: Group) -> tuple[list[SignalTable], MessageTable]:
+    """Signals and frame of a group: the vehicle's, or the project's own, by profile 05 where that of 8 bits is not sure of three flipped bits."""
+    frame, wire = group.frame, group.frame.wire
+    if wire is not None:
+        signals = [field_table(model.signals[i], f, group.applied_as_sent) for i, f in zip(group.signals, wire.fields, strict=True)]
+        flags = (EXTENDED if wire.extended else 0) | (FD if wire.fd else 0) | (BRS if wire.fd and wire.brs else 0)
+        return signals, MessageTable(group.name, wire.id, flags, wire.length, wire.protection, wire.idle)
+    signals, protection, length = _own_layout(model, group, frame.profile or USUAL)
+    if frame.profile is None and length > SURE:
+        signals, protection, length = _own_layout(model, group, LONG)
+    return signals, message_table(group.name, frame, length, protection)
 
 
 def verdict_table(model: Model) -> MessageTable:
@@ -276,28 +337,33 @@ def verdict_table(model: Model) -> MessageTable:
     return message_table("verdict", model.verdict, 12 if wide else 8)
 
 
+def _check_alias(group: Group, message: MessageTable) -> None:
+    """Refuse a counter that runs round before the group is stale: as many lost frames would look like none."""
+    modulus, horizon = message.protection.modulus, group.trigger.interval_max + group.trigger.margin
+    shortest = min(group.trigger.silence) + 1
+    if message.protection.profile != NONE and modulus * shortest <= horizon:
+        raise InputError(
+            f"group '{group.name}': its counter of {modulus} hides the loss of {modulus} frames, which can pass within interval_max + margin = {horizon} samples; "
+            f"shorten them to {modulus * shortest - 1}, or make the sender silent for longer"
+        )
+
+
 def group_table(model: Model, group: Group, slew: Array) -> GroupTable:
     """Trigger in codes, hold in signal units. `slew` (signals x horizon) is of the model's whole signal vector."""
-    trigger = group.trigger
-    signals, start = [], HEADER_BITS
-    for i in group.signals:
-        s = signal_table(model.signals[i], start, group.applied_as_sent)
-        signals.append(s)
-        start += s.length
+    trigger, skew = group.trigger, group.skew
+    signals, message = _layout(model, group)
     resolution = np.array([s.resolution for s in signals])
     half = np.array([s.half for s in signals])
-    horizon = trigger.interval_max + trigger.margin
     # Radius (threshold + 1/2) resolution must not exceed the trigger that was asked for.
     sigma = np.maximum(np.floor(trigger.sigma / resolution - 0.5 + 1e-6), 0.0)
     widest = np.array([s.span for s in signals])
-    table = np.minimum(slew[list(group.signals), :horizon].T + half, widest)
-    message = message_table(group.name, group.frame, start // 8)
-    shortest = min(trigger.silence) + 1
-    if 16 * shortest <= horizon:
-        raise InputError(
-            f"group '{group.name}': its counter of 16 hides the loss of 16 frames, which can pass within interval_max + margin = {horizon} samples; "
-            f"shorten them to {16 * shortest - 1}, or make the sender silent for longer"
-        )
+    moved = slew[list(group.signals), : group.horizon].T
+    table = np.minimum(moved[skew:] + half, widest)
+    if skew:
+        # Booked to a sample that it need not be of: fresh is as old as that may be.
+        late = up32(np.minimum(moved[skew - 1] + half, widest))
+        signals = [replace(s, half=float(h)) for s, h in zip(signals, late, strict=True)]
+    _check_alias(group, message)
     return GroupTable(
         name=group.name,
         first=group.signals[0] if group.signals else 0,

@@ -7,16 +7,18 @@ import itertools
 import json
 import re
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hullguard.design.protection import MODAL, MODES, NIBBLE_ID_MAX, NONE, PROFILES
 from hullguard.errors import InputError
 from hullguard.model.choice import read_orders, read_parity, read_poles
 from hullguard.model.detector import DetectorSpec, read_detector
 from hullguard.model.faults import FaultSpec, parse_fault
+from hullguard.model.network import Network, Wire, adopt, check_range
 from hullguard.model.plant import Plant, read_plant
 from hullguard.model.table import Array, Table
 from hullguard.model.templates import expand
@@ -28,6 +30,7 @@ GROUPS_MAX = 8
 GENERATORS_MAX = 32
 FAULTS_MAX = 32
 GROUP_SIGNALS_MAX = 32
+PERIOD_MAX = 190  # samples; with the widest margin, what a receiver's age can count
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,19 @@ class Frame:
     extended: bool
     fd: bool | None  # None: CAN FD where a classic frame is too short
     data_id: int
+    profile: str | None = None  # of E2E; None: by the length of the frame
+    mode: str = "both"  # of the data identifier, profiles 01 and 11
+    wire: Wire | None = None  # the frame as a vehicle has it; its protection is the one that counts
+
+    @property
+    def stamped(self) -> bool:
+        """Whether the frame says which sample it belongs to."""
+        return self.wire.protection.stamped if self.wire is not None else self.profile != NONE
+
+    @property
+    def protected(self) -> bool:
+        """Whether the frame has a checksum and a counter."""
+        return (self.wire.protection.profile if self.wire is not None else self.profile) != NONE
 
 
 @dataclass(frozen=True)
@@ -67,6 +83,11 @@ class Trigger:
     activity: Array  # levels x width: change between frames that reaches the level; row 0 is not used
     margin: int
 
+    @property
+    def periodic(self) -> bool:
+        """Whether a sender speaks every interval_max samples, whatever its signals do."""
+        return min(self.silence) + 1 >= self.interval_max
+
 
 @dataclass(frozen=True)
 class Group:
@@ -78,6 +99,12 @@ class Group:
     trigger: Trigger
     closing: bool
     applied_as_sent: bool
+    skew: int = 0  # samples: a value may be that much older, or by the sender's own clock newer, than the sample it is booked to
+
+    @property
+    def horizon(self) -> int:
+        """Samples for which the slews of its signals are needed."""
+        return self.trigger.interval_max + self.trigger.margin + self.skew
 
 
 @dataclass(frozen=True)
@@ -157,6 +184,7 @@ class Model:
     path: Path
     sample_time_s: float
     bitrate_bps: int
+    data_bitrate_bps: int  # of CAN FD frames; bitrate_bps where the model does not say
     load_max: float
     plant: Plant
     signals: tuple[Signal, ...]
@@ -310,6 +338,7 @@ def parse_override(text: str) -> tuple[str, Any]:
 def parse_model(source: dict[str, Any], path: Path) -> Model:
     """Check a model's data and make a Model of it."""
     data = expand(source, path.name)
+    network = adopt(data, path.name, path.parent)
     top = Table(data, path.name)
     if top.whole("schema", 1, 10_000) != SCHEMA:
         raise top.error("schema", f"this version reads schema {SCHEMA}")
@@ -318,12 +347,13 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     sample_time_s = top.number("sample_time_s", 1e-6, 3600.0)
     bus = top.table("bus", optional=True)
     bitrate = bus.whole("bitrate_bps", 10_000, 8_000_000, 500_000)
+    data_bitrate = bus.whole("data_bitrate_bps", bitrate, 20_000_000, bitrate)
     load_max = bus.number("load_max", 0.01, 1.0, 0.7)
     bus.close()
 
     declared = [_read_signal(t) for t in top.tables("signals")]
     _unique([s.name for s in declared], f"{path.name}: signals")
-    groups, order = _read_groups(top, declared, path)
+    groups, order = _read_groups(top, declared, path, network, sample_time_s)
     signals = tuple(declared[i] for i in order)
     outputs = [s.name for s in signals if s.role == "output"]
     inputs = [s.name for s in signals if s.role == "input"]
@@ -345,10 +375,9 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
                 raise inner.error(f"{key}.faults", f"'{n}' is not one of {', '.join(f.name for f in faults) or 'none'}")
     observers = _read_observers(inner, outputs, inputs, faults)
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
+    _free(path, network, [("verdict", verdict), ("status", status), *((g.name, g.frame) for g in groups)])
     scenarios = _read_scenarios(top, path)
-    network = top.table("network", optional=True)
-    _later(network, "dbc")
-    network.close()
+    top.table("network", optional=True)  # read by adopt
     top.close()
     if sum(g.closing for g in groups) != 1:
         raise InputError(f'{path.name}: exactly one group closes the sample with transmission = "tick"; found {sum(g.closing for g in groups)}')
@@ -357,6 +386,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         path=path,
         sample_time_s=sample_time_s,
         bitrate_bps=bitrate,
+        data_bitrate_bps=data_bitrate,
         load_max=load_max,
         plant=plant,
         signals=signals,
@@ -371,7 +401,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         latch=latch,
         faults=faults,
         scenarios=scenarios,
-        sha256=_fingerprint(data),
+        sha256=_fingerprint(data | {"network": network.plain()} if network.taken else data),
     )
 
 
@@ -400,11 +430,12 @@ def _name(t: Table, *taken: str) -> str:
     return name
 
 
-def _later(t: Table, *keys: str) -> None:
-    """Refuse keys of the schema that this version cannot honour: ignoring them would promise what is not done."""
-    for key in keys:
-        if key in t:
-            raise t.error(key, "part of the schema, but not of this version; remove it")
+def _free(path: Path, network: Network, frames: list[tuple[str, Frame]]) -> None:
+    """Refuse a frame of the project's own with an identifier that the vehicle uses."""
+    for name, frame in frames:
+        other = network.taken.get((frame.id, frame.extended))
+        if frame.wire is None and other is not None:
+            raise InputError(f"{path.name}: '{name}' would send with identifier 0x{frame.id:X}, which is that of the vehicle's message '{other}'; choose another")
 
 
 def _read_signal(t: Table) -> Signal:
@@ -439,12 +470,12 @@ def _read_signal(t: Table) -> Signal:
     return signal
 
 
-def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[Group, ...], list[int]]:
+def _read_groups(top: Table, declared: list[Signal], path: Path, network: Network, sample_time_s: float) -> tuple[tuple[Group, ...], list[int]]:
     """The groups, and the declared signals in the order in which the groups send them."""
     names = [s.name for s in declared]
     groups: list[Group] = []
     order: list[int] = []
-    for t in top.tables("groups"):
+    for t, wire in zip(top.tables("groups"), network.wires, strict=True):
         members = t.names("signals", [])
         for member in members:
             if member not in names:
@@ -454,7 +485,7 @@ def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[
         places = [names.index(m) for m in members]
         first = len(order)
         order += places
-        groups.append(_read_group(t, tuple(range(first, len(order))), [declared[i] for i in places]))
+        groups.append(_read_group(t, tuple(range(first, len(order))), [declared[i] for i in places], wire, sample_time_s))
     if not 1 <= len(groups) <= GROUPS_MAX:
         raise InputError(f"{path.name}: {len(groups)} groups; 1 .. {GROUPS_MAX} are possible")
     _unique([g.name for g in groups], f"{path.name}: groups")
@@ -466,12 +497,25 @@ def _read_groups(top: Table, declared: list[Signal], path: Path) -> tuple[tuple[
         if ids.count(key) > 1:
             raise InputError(f"{path.name}: two groups send with identifier 0x{g.frame.id:X}; give each its own")
     closing = [g for g in groups if g.closing]
+    _check_stamps(path, groups)
     for g in groups:
-        if closing and not g.closing and _priority(g.frame) > _priority(closing[0].frame):
+        # Behind the closing frame a frame without a stamp is booked to the next sample, which its skew covers.
+        if closing and not g.closing and (g.frame.stamped or g.skew == 0) and _priority(g.frame) > _priority(closing[0].frame):
             raise InputError(
                 f"{path.name}: group '{g.name}' (0x{g.frame.id:X}) would arrive after the closing frame (0x{closing[0].frame.id:X}): give the closing frame the larger identifier"
             )
     return tuple(groups), order
+
+
+def _check_stamps(path: Path, groups: list[Group]) -> None:
+    """Refuse stamps that nothing tells the detector how to read: a closing frame without one counts samples by itself."""
+    blind = [g.name for g in groups if g.closing and not g.frame.stamped]
+    stamped = [g.name for g in groups if g.frame.stamped]
+    if blind and stamped:
+        raise InputError(
+            f"{path.name}: the closing frame of group '{blind[0]}' has no stamp, so nothing says what the stamps of '{stamped[0]}' count from; "
+            'name a free signal of 4 bits, protection = { .., stamp = ".." }, or close the sample with a tick of its own'
+        )
 
 
 def _priority(frame: Frame) -> tuple[int, bool, int]:
@@ -480,18 +524,28 @@ def _priority(frame: Frame) -> tuple[int, bool, int]:
 
 
 def read_frame(t: Table, data_id: int) -> Frame:
-    """A message's place on the bus; the protection is profile 22."""
+    """A message of the project's own layout: its place on the bus and its protection."""
     extended = t.flag("extended", False)
-    t.text("protection", "P22", ["P22"])
-    frame = Frame(t.whole("id", 0, 0x1FFFFFFF if extended else 0x7FF), extended, t.flag("fd", False) if "fd" in t else None, t.whole("data_id", 0, 0xFFFF, data_id))
+    if "protection" in t and isinstance(t.raw("protection"), dict):
+        raise t.error("protection", f"names signals of a database, and the frame is not from one; give the group dbc_message, or one of {', '.join(PROFILES)}")
+    profile = t.text("protection", "", PROFILES) or None
+    mode = t.text("mode", "both", MODES) if profile in MODAL else "both"
+    most = NIBBLE_ID_MAX if mode == "nibble" else 0xFFFF
+    number = t.whole("id", 0, 0x1FFFFFFF if extended else 0x7FF)
+    frame = Frame(number, extended, t.flag("fd", False) if "fd" in t else None, t.whole("data_id", 0, most, data_id & most), profile, mode)
     t.close()
     return frame
 
 
-def _read_group(t: Table, places: tuple[int, ...], members: list[Signal]) -> Group:
+def _read_group(t: Table, places: tuple[int, ...], members: list[Signal], wire: Wire | None, sample_time_s: float) -> Group:
     transmission = t.text("transmission", "event", ["event", "tick", "periodic"])
-    inner = t.table("frame")
-    frame = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+    if wire is not None:
+        for field, member in zip(wire.fields, members, strict=True):
+            check_range(wire, field, member)
+        frame = Frame(wire.id, wire.extended, wire.fd, wire.protection.data_id, wire.protection.profile, wire.protection.mode, wire)
+    else:
+        inner = t.table("frame")
+        frame = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
     applied = t.flag("applied_as_sent", False)
     if applied and any(s.role != "input" for s in members):
         raise t.error("applied_as_sent", "only inputs can be applied as sent")
@@ -499,12 +553,44 @@ def _read_group(t: Table, places: tuple[int, ...], members: list[Signal]) -> Gro
     if transmission == "event":
         trigger = _read_trigger(t.table("trigger"), members)
     else:
+        period = _read_period(t, wire, transmission == "tick", sample_time_s)
         margin = t.whole("margin", 0, 64, 4)
         empty = np.zeros((1, width))
-        trigger = Trigger(empty, empty, (0,), 1, empty, margin)
-    group = Group(_name(t, "verdict", "status"), places, frame, trigger, transmission == "tick", applied)
+        trigger = Trigger(empty, empty, (period - 1,), period, empty, margin)
+    skew = t.whole("skew_samples", 0, 16, 0 if frame.stamped or transmission == "tick" else 1)
+    group = Group(_name(t, "verdict", "status"), places, frame, trigger, transmission == "tick", applied, skew)
+    _check_stamp(t, group)
     t.close()
     return group
+
+
+def _read_period(t: Table, wire: Wire | None, closing: bool, sample_time_s: float) -> int:
+    """Samples from one frame of a periodic sender to its next; what the model and the database say must agree."""
+    sample_ms = 1000 * sample_time_s
+    stated = wire.cycle_ms if wire is not None else 0
+    usual = max(1, round(stated / sample_ms))
+    period = 1 if closing else t.whole("period_samples", 1, PERIOD_MAX, usual)
+    if period > PERIOD_MAX:
+        raise InputError(f"{t.where}: its period of {period} samples is more than {PERIOD_MAX}; choose a longer sample time")
+    if wire is not None and stated and abs(stated - period * sample_ms) > max(0.5, 1e-6 * stated):
+        cure = "give the model that sample time" if closing else "choose period_samples, or a sample time that divides the cycle"
+        raise InputError(f"{t.where}: message '{wire.message}' is sent every {stated} ms by the database, {period} x {sample_ms:g} ms by the model; {cure}")
+    return period
+
+
+def _check_stamp(t: Table, group: Group) -> None:
+    """Refuse what a frame without a counter, or without a stamp, cannot promise."""
+    periodic = group.trigger.periodic
+    if group.closing and not group.frame.protected:
+        raise InputError(f"{t.where}: the closing frame without protection: the sample index would rest on a frame that may be damaged or repeated; protect it")
+    if not periodic and not group.frame.protected:
+        cure = 'protect it, or make it transmission = "periodic"'
+        raise InputError(f"{t.where}: an event-triggered frame without protection: without a counter a lost frame looks like silence, which is a promise; {cure}")
+    if group.closing and group.skew:
+        raise t.error("skew_samples", "the closing frame says which sample is which: its values are of the one it closes; remove it")
+    if not periodic and group.skew:
+        # A promise begins with the sender's sample, which the receiver would have to know.
+        raise t.error("skew_samples", "an event-triggered sender must sample with the tick: give skew_samples = 0 if it does, or send periodically")
 
 
 def _read_trigger(t: Table, members: list[Signal]) -> Trigger:
@@ -614,16 +700,22 @@ def _read_search(s: Table) -> Search:
     return search
 
 
+def _detector_frame(t: Table) -> Frame:
+    """A frame of the detector's own."""
+    frame = read_frame(t, int(t.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+    if frame.profile not in (None, "P22"):
+        raise t.error("protection", f"the detector's own frames have a layout of profile 22, not {frame.profile}; remove it")
+    return frame
+
+
 def _read_verdict(t: Table, groups: tuple[Group, ...]) -> tuple[Frame, Frame, int, int, int, bool]:
-    inner = t.table("frame")
-    verdict = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+    verdict = _detector_frame(t.table("frame"))
     if "status_frame" in t:
-        inner = t.table("status_frame")
-        status = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
+        status = _detector_frame(t.table("status_frame"))
     else:
         if verdict.id == (0x1FFFFFFF if verdict.extended else 0x7FF):
             raise t.error("frame", "there is no identifier behind it for the status frame; give status_frame, or a smaller id")
-        status = Frame(verdict.id + 1, verdict.extended, verdict.fd, (verdict.data_id + 1) & 0xFFFF)
+        status = replace(verdict, id=verdict.id + 1, data_id=(verdict.data_id + 1) & 0xFFFF)
     taken = [g.frame.id for g in groups] + [verdict.id, status.id]
     for i in (verdict.id, status.id):
         if taken.count(i) > 1:

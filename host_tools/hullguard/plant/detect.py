@@ -28,8 +28,8 @@ class Detector:
         self._steps_since = 0
         self.samples = self.outages = 0
 
-    def take(self, frame: Frame, time_s: float) -> None:
-        """One frame from the bus, with its time stamp."""
+    def take(self, frame: Frame, time_s: float) -> int:
+        """One frame from the bus, with its time stamp; the status of the library."""
         closing = frame.id == self._closing
         if closing and self._period is not None and self._closed_at is not None:
             missed = round((time_s - self._closed_at) / self._period) - 1 - self._steps_since
@@ -37,10 +37,11 @@ class Detector:
             if missed > STAMPS:
                 self.node.outage()
                 self.outages += 1
-        accepted = self.node.receive(frame) == OK
+        status = self.node.receive(frame)
         self.steps()
-        if closing and accepted:
+        if closing and status == OK:
             self._closed_at, self._steps_since = time_s, 0
+        return status
 
     def overdue(self) -> None:
         """The closing frame has not come in time: the sample is closed without it."""

@@ -18,9 +18,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from hullguard.bus import candump
+from hullguard.bus.bits import bit_times
 from hullguard.bus.link import CanLink
 from hullguard.core.library import library
-from hullguard.core.native import REST, Frame, Native, Node, Sender, Verdict, frame_bits, read_verdict
+from hullguard.core.native import REST, Frame, Native, Node, Sender, Verdict, data_bits, frame_bits, read_verdict
 from hullguard.core.pair import Pair
 from hullguard.design.design import Design
 from hullguard.design.judges import judges, residual_columns
@@ -54,6 +55,7 @@ class Trace:
     verdict: list[Verdict] = field(default_factory=list)
     events: list[tuple[int, ...]] = field(default_factory=list)  # groups that sent
     bits: list[int] = field(default_factory=list)
+    data_bits: list[int] = field(default_factory=list)  # of these, the ones at the data bit rate
     heard: list[Verdict] = field(default_factory=list)  # what a node told that runs freely
     reply_bits: int = 0  # of frames sent only because lockstep answers every tick
     counts: dict[str, int] = field(default_factory=lambda: {"measurement": 0, "closing": 0, "verdict": 0, "reply": 0})
@@ -161,7 +163,7 @@ class Run:
 
     def _sample(self, source: Source, k: int, time_s: float) -> None:
         reading = source.read()
-        events, bits = [], 0
+        events, bits, fast = [], 0, 0
         for g in self._order:
             frame = self.sender.step(g, k, reading)
             if frame is None:
@@ -171,17 +173,18 @@ class Run:
             self.node.receive(frame)
             self.bus.send(frame, time_s)
             bits += frame_bits(self.native.library, frame)
+            fast += data_bits(self.native.library, frame)
             self.trace.counts["closing" if g == self.native.tables.closing else "measurement"] += 1
         verdict = self.node.step()
         if verdict is None:
             raise ExpectationError(f"the closing frame of sample {k} was not accepted: {self.node.health()}")
         expected = self.node.report(self.pace.lockstep)
-        bits += self._answers(k, verdict, expected, time_s)
-        self._record(reading, verdict, tuple(sorted(events)), bits)
+        told = self._answers(k, verdict, expected, time_s)
+        self._record(reading, verdict, tuple(sorted(events)), bits + told[0], fast + told[1])
 
-    def _answers(self, k: int, verdict: Verdict, expected: list[Frame], time_s: float) -> int:
-        """Frames of the node: logged, counted, and in lockstep compared. The bits of those that a free-running node would send too."""
-        bits = 0
+    def _answers(self, k: int, verdict: Verdict, expected: list[Frame], time_s: float) -> tuple[int, int]:
+        """Frames of the node: logged, counted, and in lockstep compared. Bits of those that a free-running node would send too: all, and at the data rate."""
+        bits = fast = 0
         got = self.bus.answer(k, expected, time_s)
         for frame, _ in got:
             self._write(frame, time_s)  # a log has one clock, the run's
@@ -195,12 +198,13 @@ class Run:
             else:
                 self.trace.counts["verdict"] += 1
                 bits += length
+                fast += data_bits(self.native.library, frame)
         if self.pace.lockstep and self.mismatch is None:
             for frame, own in zip([f for f, _ in got], expected, strict=True):
                 if frame != own:
                     self.mismatch = self._difference(k, frame, own, verdict)
                     break
-        return bits
+        return bits, fast
 
     def _difference(self, k: int, frame: Frame, own: Frame, verdict: Verdict) -> str:
         """Why a node's frame is not the one that this process would have sent."""
@@ -215,7 +219,7 @@ class Run:
         if self._log is not None:
             self._log.write(time_s, frame)
 
-    def _record(self, reading: list[float], verdict: Verdict, events: tuple[int, ...], bits: int) -> None:
+    def _record(self, reading: list[float], verdict: Verdict, events: tuple[int, ...], bits: int, fast: int) -> None:
         t = self.trace
         t.reading.append(reading)
         t.value.append(self.node.value)
@@ -225,23 +229,24 @@ class Run:
         t.verdict.append(verdict)
         t.events.append(events)
         t.bits.append(bits)
+        t.data_bits.append(fast)
 
 
-def periodic_bits(design: Design, native: Native, readings: Sequence[Sequence[float]]) -> tuple[int, int, int]:
-    """Frames, bits, and bits of the measurement groups alone, if every group sent every sample through the same codec."""
+def periodic_bits(design: Design, native: Native, readings: Sequence[Sequence[float]]) -> tuple[int, int, int, int]:
+    """Frames, bits, bits of the measurement groups alone, and bits at the data rate, if every group sent every sample through the same codec."""
     tables = native.tables
     groups = tuple(replace(g, levels=1, interval_max=1, silence=(0,), delta=g.delta[:1], sigma=g.sigma[:1], activity=g.activity[:1]) for g in tables.groups)
     every = Native(native.library, replace(tables, groups=groups))
     sender = Sender(every)
-    frames = bits = measured = 0
+    frames = bits = measured = fast = 0
     for k, reading in enumerate(readings):
         for g in range(len(groups)):
             frame = sender.step(g, k, reading)
             if frame is not None:
                 length = frame_bits(native.library, frame)
-                frames, bits = frames + 1, bits + length
+                frames, bits, fast = frames + 1, bits + length, fast + data_bits(native.library, frame)
                 measured += 0 if g == tables.closing else length
-    return frames, bits, measured
+    return frames, bits, measured, fast
 
 
 def summary(design: Design, native: Native, trace: Trace, faults: Sequence[FaultSpec], facts: dict[str, Any]) -> dict[str, Any]:
@@ -249,8 +254,10 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
     model, tables = design.model, native.tables
     samples = len(trace.verdict)
     first = min((f.start for f in faults), default=samples)
-    frames_periodic, bits_periodic, bits_measured = periodic_bits(design, native, trace.reading)
-    load = _load(trace.bits, model.sample_time_s, model.bitrate_bps)
+    frames_periodic, bits_periodic, bits_measured, fast_periodic = periodic_bits(design, native, trace.reading)
+    length = [bit_times(b, f, model.bitrate_bps, model.data_bitrate_bps) for b, f in zip(trace.bits, trace.data_bits, strict=True)]
+    load = _load(length, model.sample_time_s, model.bitrate_bps)
+    switched = {"data_bits": sum(trace.data_bits), "data_bits_periodic": fast_periodic} if switches(model) else {}
     groups, intervals = _intervals(tables.groups, tables.closing, trace.events)
     alarms = [v.plant in ALARMS for v in trace.verdict]
     confirmed = [v.plant == "confirmed" for v in trace.verdict]
@@ -265,6 +272,7 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
         "judges": [asdict(j) for j in judges(design)],
         **facts,
         "bitrate": model.bitrate_bps,
+        **({"data_bitrate": model.data_bitrate_bps} if switched else {}),
         "samples": samples,
         "sample_time_s": model.sample_time_s,
         "frames": {
@@ -279,6 +287,7 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
             "load_mean": load[0],
             "load_p99": load[1],
             "load_bound": design.load_bound,
+            **switched,
         },
         "per_group": groups,
         "events": {"interval_min": min(intervals, default=None), "interval_max": max(intervals, default=None)},
@@ -290,8 +299,13 @@ def summary(design: Design, native: Native, trace: Trace, faults: Sequence[Fault
     }
 
 
-def _load(bits: Sequence[int], sample_time_s: float, bitrate: int) -> tuple[float, float]:
-    """Mean load and the 99th percentile over windows of one second."""
+def switches(model: Model) -> bool:
+    """Whether the bus has a second bit rate, so that bits alone do not tell the load."""
+    return model.data_bitrate_bps != model.bitrate_bps
+
+
+def _load(bits: Sequence[float], sample_time_s: float, bitrate: int) -> tuple[float, float]:
+    """Mean load and the 99th percentile over windows of one second; `bits` are bit times of the nominal rate."""
     window = max(1, round(1.0 / sample_time_s))
     sums = np.convolve(bits, np.ones(min(window, len(bits))), "valid")
     return float(np.sum(bits) / (len(bits) * sample_time_s * bitrate)), float(np.percentile(sums, 99) / (min(window, len(bits)) * sample_time_s * bitrate))
@@ -395,7 +409,7 @@ def write_files(directory: Path, design: Design, native: Native, trace: Trace, f
     header = ["time_s", "k"] + [c for n in names for c in (n, f"{n}.value", f"{n}.radius")]
     before = before_filter(design, trace) if result.get("figures") else np.zeros((len(trace.verdict), 0))
     header += [c for x in residuals for c in (f"r{x}", f"J{x}")] + [f"before{x}" for x in residuals[: before.shape[1]]]
-    header += ["plant"] + [f"event.{g.name}" for g in tables.groups] + ["bits"]
+    header += ["plant"] + [f"event.{g.name}" for g in tables.groups] + ["bits"] + ["data_bits"] * switches(model)
     codes = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
     with (directory / "signals.csv").open("w", encoding="utf-8") as file:
         file.write(",".join(header) + "\n")
@@ -407,6 +421,7 @@ def write_files(directory: Path, design: Design, native: Native, trace: Trace, f
                 row += [f"{r:.9g}", f"{J:.9g}"]
             row += [f"{x:.9g}" for x in before[k]]
             row += [str(codes[v.plant])] + [str(int(g in trace.events[k])) for g in range(len(tables.groups))] + [str(trace.bits[k])]
+            row += [str(trace.data_bits[k])] * switches(model)
             file.write(",".join(row) + "\n")
     with (directory / "labels.csv").open("w", encoding="utf-8") as file:
         file.write("start,end,name,kind,size,signal\n")

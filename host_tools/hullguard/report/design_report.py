@@ -12,11 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from hullguard.bus.bits import worst_bits
+from hullguard.bus.bits import worst_bit_times, worst_bits
 from hullguard.design.design import Design, Generator
+from hullguard.design.ids import ERRORS, undetected_patterns
 from hullguard.design.isolation import Pair
 from hullguard.design.judges import BANK, HYPOTHESIS, judges
-from hullguard.design.tables import GeneratorTable
+from hullguard.design.protection import MODAL, NONE
+from hullguard.design.tables import GeneratorTable, MessageTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
 from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section, uncertain_names
@@ -75,10 +77,11 @@ def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
 
 def _summary(design: Design) -> Iterator[str]:
     model, passed = design.model, sum(c.passed for c in design.checks)
+    fast = f", {num(model.data_bitrate_bps / 1000)} kbit/s in data phases" if model.data_bitrate_bps != model.bitrate_bps else ""
     yield f"<h1>hullguard design: {esc(model.name)}</h1>"
     yield (
         f'<p class="note">{plural(model.plant.n, "state")}, {plural(model.plant.m, "output")}, {plural(model.plant.p, "input")}; {num(model.sample_time_s * 1000)} ms; '
-        f"{num(model.bitrate_bps / 1000)} kbit/s; model hash <code>{design.tables.hash:08x}</code></p>"
+        f"{num(model.bitrate_bps / 1000)} kbit/s{fast}; model hash <code>{design.tables.hash:08x}</code></p>"
     )
     yield f'<p class="lead">{esc(_judging(design))}; {passed} of {len(design.checks)} checks passed.</p>'
     used = [g for g in design.generators if g.filter.regularised > 0]
@@ -182,24 +185,35 @@ def _frames(design: Design) -> str:
                 f"0x{message.id:X}",
                 what,
                 f"{message.length}\u00a0bytes" + ("\u00a0FD" if message.flags & 4 else ""),
+                *_protection(message),
                 bits,
                 every,
-                percent(bits / every / period),
+                percent(worst_bit_times(message, model.bitrate_bps, model.data_bitrate_bps) / every / period),
             ]
         )
-    rows.append(["all", "", "", "", "", "", percent(design.load_bound)])
+    rows.append(["all", "", "", "", "", "", "", "", percent(design.load_bound)])
     return table(
-        ["frame", "identifier", "content", "length", "#most bits", "#at most every (samples)", "#load, worst case"],
+        ["frame", "identifier", "content", "length", "protection", "#errors it misses", "#most bits", "#at most every (samples)", "#load, worst case"],
         rows,
-        f"End-to-end protection: AUTOSAR E2E profile 22. The limit of the load is {percent(model.load_max)}.",
+        f"End-to-end protection by profiles of AUTOSAR E2E; of all errors of up to {ERRORS} flipped bits, those that its checksum does not see are counted. "
+        f"The limit of the load is {percent(model.load_max)}.",
     )
+
+
+def _protection(message: MessageTable) -> tuple[str, str | int]:
+    """Profile, and how many of the smallest errors pass."""
+    p = message.protection
+    if p.profile == NONE:
+        return "none", ""
+    return p.profile + (f" {p.mode}" if p.profile in MODAL else ""), undetected_patterns(p, message.length)
 
 
 def _triggers(design: Design) -> str:
     rows = []
     for g, t in zip(design.model.groups, design.tables.groups, strict=True):
-        if t.interval_max <= 1:
-            rows.append([g.name, "", "", "every sample, closes it" if g.closing else "every sample", "", 1, 1 + t.margin])
+        if t.periodic:
+            usual = "every sample" if t.interval_max == 1 else f"every {t.interval_max} samples"
+            rows.append([g.name, "", "", "every sample, closes it" if g.closing else usual, "", t.interval_max, t.interval_max + t.margin])
             continue
         for level in range(t.levels):
             for place, i in enumerate(g.signals):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hullguard.bus.bits import bit_times
 from hullguard.design.judges import HYPOTHESIS, KINDS, OBSERVER, Judge, residual_columns, residual_names
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -96,7 +97,7 @@ class Run:
     time: Array
     plant: Array  # index into PLANT, a sample
     bus: dict[str, Array]  # index into BUS, a sample
-    bits: Array
+    bits: Array  # on the bus, a sample; bit times of the nominal rate where data phases have another
     signals: tuple[SignalRun, ...]
     judges: tuple[Judge, ...]
     residuals: tuple[Residual, ...]
@@ -340,6 +341,14 @@ def _bus(verdicts: tuple[VerdictRun, ...], groups: tuple[GroupRun, ...], k: Arra
     return out
 
 
+def _bit_times(top: _Json, column: dict[str, Array], where: Path) -> Array:
+    bits = _column(column, "bits", where)
+    if "data_bitrate" not in top.data:
+        return bits
+    fast = _column(column, "data_bits", where)
+    return np.array([bit_times(b, f, top.number("bitrate"), top.number("data_bitrate")) for b, f in zip(bits, fast, strict=True)])
+
+
 def read_run(directory: Path) -> Run:
     """Read and check a run's directory."""
     path = directory / "run.json"
@@ -385,7 +394,7 @@ def read_run(directory: Path) -> Run:
         time=time,
         plant=plant.astype(int),
         bus=_bus(verdicts, groups, k),
-        bits=_column(column, "bits", where),
+        bits=_bit_times(top, column, where),
         signals=signals,
         judges=judges,
         residuals=residuals,

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation, Transform
 from numpy.typing import NDArray
 
+from hullguard.bus.bits import bit_times
 from hullguard.design.judges import OBSERVER
 from hullguard.model.table import Array
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RED, SKY
@@ -477,7 +478,8 @@ def load_figure(run: Run, w: Window) -> Figure:
     load[n - 1 :] = 100 * (total[n:] - total[:-n]) / (n * run.sample_time_s * run.bitrate)
     _limits(ax, run, w)
     t = run.time[w.rows]
-    periodic = 100 * float(frames["bits_periodic"]) / (len(run.k) * run.sample_time_s * run.bitrate)
+    fast, rate = float(frames.get("data_bits_periodic", 0)), float(run.info.get("data_bitrate", run.bitrate))
+    periodic = 100 * bit_times(float(frames["bits_periodic"]), fast, run.bitrate, rate) / (len(run.k) * run.sample_time_s * run.bitrate)
     bound, mean = 100 * float(frames["load_bound"]), 100 * float(frames["load_mean"])
     band(ax, t, np.zeros(w.size), load[w.rows], BLUE, 0.18, step=False)
     line(ax, t, load[w.rows], BLUE, width=1.3)

@@ -1,0 +1,130 @@
+"""`hullguard campaign MODEL --inject SPEC`: faulty frames instead of a grid of losses."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from rich.console import Console
+from rich.table import Table
+
+from hullguard.campaign.frames import Tally
+from hullguard.campaign.frames_all import CLASSES, HEAVY, FrameCase, all_cases, case_of
+from hullguard.campaign.frames_study import CHUNK, FramesJob, codec_for, failures, pooled, rows, study
+from hullguard.commands import emit, make_folder, prepared, progress, say, the_faults
+from hullguard.design.design import Design
+from hullguard.errors import ExpectationError, InputError
+from hullguard.inject.engine import Injector
+
+ALL = "all"
+SAID = {"stamp": "early or late"}
+WIDTH = 160  # columns where the output is no terminal
+UNUSED: dict[str, Any] = {
+    "loss": "0", "loss_burst": "0", "size": None, "each_fault": False, "vary": [], "limit": False, "plants": 0, "attack": 0.0, "scheduler": None, "table": None,
+}  # fmt: skip
+
+
+def run_frames(args: argparse.Namespace) -> int:
+    """Inject, count, compare; status 1 when a counter differs from the ledger or a class does not hold."""
+    for name, default in UNUSED.items():
+        if getattr(args, name) != default:
+            raise InputError(f"--{name.replace('_', '-')} and --inject do not go together: faulty frames are made one by one; use a campaign of its own for each")
+    model, made = prepared(args)
+    scenario = model.scenario(args.scenario)
+    samples = args.samples or scenario.samples
+    end = samples // 2
+    faults = the_faults(args, model, scenario.faults, samples)
+    if any(f.start >= end for f in faults):
+        raise InputError(f"frames are tampered with until sample {end}, half of the run: let the fault start before, or use --samples")
+    cases = _cases(args, made, end)
+    job = FramesJob(made.model, made.stored, args.real, scenario, samples, end, tuple(faults), args.seed)
+    began = time.monotonic()
+    chunks = -(-args.runs // CHUNK) * len(cases)
+    with progress(args, "faulty frames") as tick:
+        done = 0
+
+        def more(count: int) -> None:
+            nonlocal done
+            done += count
+            tick("tasks", done, chunks)
+
+        tallies = study(job, cases, args.runs, args.workers or os.cpu_count() or 1, more)
+    found = rows(cases, tallies, made)
+    failed, together = failures(found), pooled(found)
+    result = {
+        "model": model.name, "scenario": scenario.name, "seed": args.seed, "samples": samples, "tampered_until": end, "runs": sum(r["runs"] for r in found),
+        "frames": sum(r["frames"] for r in found), "injected": sum(r["injected"] for r in found), "faults": [str(f) for f in faults], "rows": found,
+        "damaged": together, "failures": failed,
+    }  # fmt: skip
+    if args.out:
+        _write(Path(args.out), result, cases, tallies)
+    if not args.quiet:
+        show(found, sys.stderr if args.json else sys.stdout)
+    if together["tried"]:
+        low, high = together["interval"]
+        say(args, f"of {together['tried']} heavily damaged frames {together['passed']} passed the checksum, expected {together['expected']:.1f} ({low} .. {high})")
+    say(args, f"{result['injected']} faulty frames in {result['runs']} runs of {samples} samples, {time.monotonic() - began:.0f} s; frames are tampered with until sample {end}")
+    emit(args, result)
+    if failed:
+        raise ExpectationError("; ".join(failed[:3]) + (f"; and {len(failed) - 3} more" if len(failed) > 3 else ""))
+    return 0
+
+
+def _cases(args: argparse.Namespace, made: Design, end: int) -> list[FrameCase]:
+    codec = codec_for(made)
+    cases: list[FrameCase] = []
+    for spec in args.inject:
+        cases += all_cases(made.model, made.tables, codec, end // 5, end) if spec == ALL else [case_of(spec)]
+    for c in cases:
+        Injector([c.directive], codec)  # refuses what cannot be, before the work begins
+    return cases
+
+
+def _write(out: Path, result: dict[str, Any], cases: Sequence[FrameCase], tallies: Sequence[Tally]) -> None:
+    """frames.json, and passes.csv: every damaged frame that a checksum let pass."""
+    make_folder(out)
+    (out / "frames.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    with (out / "passes.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["directive", "run", "time_s", "frame", "content", "counted_as"])
+        for c, t in zip(cases, tallies, strict=True):
+            writer.writerows([c.spec, run, f"{time_s:.6f}", *rest] for run, time_s, *rest in t.passes)
+
+
+def show(rows: Sequence[dict[str, Any]], file: TextIO) -> None:
+    """A line a directive, by class."""
+    console = Console(file=file, highlight=False)
+    if not console.is_terminal:
+        console.width = WIDTH
+    for kind, about in CLASSES.items():
+        chosen = [r for r in rows if r["class"] == kind]
+        if not chosen:
+            continue
+        table = Table(box=None)
+        for name in ("directive", "injected", "counted as", "ledger", "false alarms", "faults found"):
+            table.add_column(name, justify="right" if name == "injected" else "left", no_wrap=name != "counted as")
+        for r in chosen:
+            alarms = f"{r['confirmed']} confirmed, {r['provisional']} provisional"
+            ledger = "equal" if r["equal"] else "DIFFERS"
+            table.add_row(r["spec"].split("@")[0] + _where(r["spec"]), str(r["injected"]), _counted(r), ledger, alarms, f"{r['found']} of {r['faults']}")
+        console.print(f"{kind}: {about}")
+        console.print(table)
+
+
+def _where(spec: str) -> str:
+    found = [p.removeprefix("id=") for p in spec.partition("@")[2].split(",") if p.startswith("id=")]
+    return f" on {found[0]}" if found else ""
+
+
+def _counted(r: dict[str, Any]) -> str:
+    said = ", ".join(f"{SAID.get(name, name)} {n}" for name, n in r["counted"].items()) or f"lost {r['health']['lost']}"
+    if r["class"] == HEAVY:
+        said += f" ({r['passed']} passed, expected {r['interval'][0]} .. {r['interval'][1]})"
+    return said
