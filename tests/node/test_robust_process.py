@@ -8,4 +8,4 @@ from node_support import run_inside
 
 
 def test_misbehaviour_on_vcan(tmp_path: Path) -> None:
-    run_inside("robust_inside.py", tmp_path, interfaces=2)
+    run_inside("robust_inside.py", out=tmp_path, interfaces=2)
