@@ -301,7 +301,8 @@ static bool counted(const hg_e2e_config *config)
 
 bool hg_e2e_repeated(const hg_e2e_config *config, const hg_e2e_receiver *self, const hg_e2e_header *header)
 {
-    return counted(config) && self->seen && (header->counter == self->counter) && (header->crc == self->crc);
+    return counted(config) && self->seen && (header->counter == self->counter) && (header->crc == self->crc) &&
+           (header->stamp == self->stamp);
 }
 
 hg_status hg_e2e_sequence(const hg_e2e_config *config, hg_e2e_receiver *self, const hg_e2e_header *header, uint16_t step, hg_e2e_progress *progress)
@@ -330,6 +331,7 @@ hg_status hg_e2e_sequence(const hg_e2e_config *config, hg_e2e_receiver *self, co
     }
     self->counter = header->counter;
     self->crc = header->crc;
+    self->stamp = header->stamp;
     self->seen = true;
     return refused ? HG_E_SEQUENCE : HG_OK;
 }

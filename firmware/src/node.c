@@ -152,7 +152,7 @@ static uint16_t step_max(const hg_node *self, uint8_t group, uint32_t k)
 {
     const hg_link *link = &self->link[group];
     const hg_trigger_config *trigger = self->config->detector->hold[group].trigger;
-    if ((!link->timed) || (!self->synchronised)) {
+    if (!link->timed) {
         return HG_E2E_ANY_STEP;
     }
     uint32_t shortest = UINT8_MAX;
@@ -174,11 +174,11 @@ static hg_status admit_sample(hg_node *self, uint8_t group, const hg_e2e_header 
     hg_link *link = &self->link[group];
     const uint8_t ahead = ahead_of(self, group, header);
     const uint32_t k = (self->k + ahead) - ((ahead > STAMP_AHEAD_MAX) ? (STAMP_MASK + 1U) : 0U);
+    const uint16_t step = step_max(self, group, k);
     hg_e2e_receiver moved = link->receiver;
-    hg_status status = hg_e2e_sequence(e2e, &moved, header, step_max(self, group, k), progress);
-    if (status == HG_E_REPEATED) {
-        return status;
-    }
+    hg_status status = hg_e2e_sequence(e2e, &moved, header, step, progress); /* no repetition: admit() has looked */
+    /* In a time that is long enough for a whole turn the counter says nothing for certain. */
+    progress->continues = progress->continues && (step <= hg_e2e_modulus(e2e));
     if ((ahead == 0U) || (status == HG_OK)) {
         link->receiver = moved;
         link->k = k;
@@ -258,7 +258,17 @@ static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint
     return status;
 }
 
-/* The closing frame tells the time: steps become due. */
+/* Has a frame without a stamp been booked to the open sample? Where closing frames are missing it may be of a later one. */
+static bool misplaced(const hg_node *self)
+{
+    bool any = false;
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        any = any || (self->detector.memory.hold[i].fresh && (!stamped(self->config->message[i].e2e)));
+    }
+    return any;
+}
+
+/* The closing frame tells the time: steps become due. Without a code its numbers are not to be used, and the sample is closed without them. */
 static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_header *header)
 {
     const uint8_t closing = self->config->closing;
@@ -270,11 +280,13 @@ static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_h
         if (!agrees(self, header)) {
             return refuse_closing(self, header, ahead);
         }
-        forget_past(self);
         hg_e2e_receiver_start(&link->receiver);
     }
-    if (!known) {
-        self->k += stamped(message->e2e) ? ahead : 0U; /* the sender's sample */
+    if ((!known) || ((ahead > 0U) && misplaced(self))) {
+        if (self->synchronised) {
+            forget_past(self);
+        }
+        self->k += (known || stamped(message->e2e)) ? ahead : 0U; /* the sender's sample */
         ahead = 0U;
     }
     hg_e2e_progress progress = {.lost = 0U, .continues = false};
@@ -285,13 +297,12 @@ static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_h
     self->closed = true;
     self->closing_counter = header->counter;
     self->closing_k = self->k + ahead;
-    for (uint8_t g = 0U; g < message->width; g++) {
+    self->held = code != NULL;
+    for (uint8_t g = 0U; self->held && (g < message->width); g++) {
         self->closing[g] = code[g];
     }
-    self->held = true;
     self->continues = progress.continues;
     self->due = (uint8_t)(ahead + 1U);
-    count_good(&link->health, code, message->width);
     return HG_OK;
 }
 
@@ -309,25 +320,29 @@ static hg_status admit(const hg_node *self, uint8_t group, const hg_can_frame *f
     return status;
 }
 
-/* What a trusted frame of the open sample says. */
+/* What a frame of the open sample says. A closing frame tells the time whatever its numbers are. */
 static hg_status book(hg_node *self, uint8_t group, const hg_can_frame *frame, const hg_e2e_header *header, const hg_e2e_progress *progress)
 {
     int32_t code[HG_GROUP_SIGNALS_MAX];
     const hg_message *message = &self->config->message[group];
-    hg_status status = hg_frame_unpack(message, frame, code);
-    if (status == HG_OK) {
-        if (group == self->config->closing) {
-            status = close_sample(self, code, header);
-        } else {
-            const bool uncounted = (message->e2e->profile == HG_E2E_NONE) && periodic(self->config->detector->hold[group].trigger);
-            status = hg_detector_receive(&self->detector, group, code, progress->continues || uncounted);
-            if (status == HG_OK) {
-                count_good(&self->link[group].health, code, message->width);
-            } else {
-                /* A second good frame for one sample is no duplicate by its counter: what it said is lost, and the next frame continues it. */
-                (void)hg_detector_lose(&self->detector, group);
-            }
+    hg_link *link = &self->link[group];
+    const bool trusted = (link->machine.state != HG_E2E_INVALID) || ((message->e2e->ignore & HG_E2E_IGNORE_STATE) != 0U);
+    hg_status status = trusted ? hg_frame_unpack(message, frame, code) : HG_E_STATE;
+    if (group == self->config->closing) {
+        const hg_status timed = close_sample(self, (status == HG_OK) ? code : NULL, header);
+        status = (timed == HG_OK) ? status : timed;
+    } else if (status == HG_OK) {
+        const bool uncounted = (message->e2e->profile == HG_E2E_NONE) && periodic(self->config->detector->hold[group].trigger);
+        status = hg_detector_receive(&self->detector, group, code, progress->continues || uncounted);
+        if (status == HG_E_REPEATED) {
+            /* A second good frame for one sample is no duplicate by its counter: what it said is lost, and the next frame continues it. */
+            (void)hg_detector_lose(&self->detector, group);
         }
+    } else {
+        /* refused */
+    }
+    if (status == HG_OK) {
+        count_good(&link->health, code, message->width);
     }
     return status;
 }
@@ -345,19 +360,15 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
         return HG_E_BUSY;
     }
     const bool closing = group == self->config->closing;
-    const hg_e2e_config *e2e = self->config->message[group].e2e;
     hg_link *link = &self->link[group];
     hg_status status = admit(self, group, frame, &header);
     if ((status == HG_OK) && (!closing)) {
         status = admit_sample(self, group, &header, &progress);
     }
-    if (status != HG_E_FORMAT) { /* a twin of another kind or length says nothing of the frames that its sender sends */
-        (void)hg_e2e_machine_step(&link->machine, e2e->limits, status);
+    if ((status != HG_E_FORMAT) && (status != HG_E_REPEATED)) { /* a twin of another kind or length, or a double, says nothing new of its sender */
+        (void)hg_e2e_machine_step(&link->machine, self->config->message[group].e2e->limits, status);
     }
-    if (status == HG_OK) {
-        const bool trusted = closing || (link->machine.state != HG_E2E_INVALID) || ((e2e->ignore & HG_E2E_IGNORE_STATE) != 0U);
-        status = trusted ? book(self, group, frame, &header, &progress) : HG_E_STATE;
-    }
+    status = (status == HG_OK) ? book(self, group, frame, &header, &progress) : status;
     count_refusal(&link->health, status);
     if ((status != HG_OK) && (status != HG_E_REPEATED)) {
         (void)hg_detector_lose(&self->detector, group);

@@ -4,7 +4,7 @@
 
 #include "hullguard/node.h"
 
-#include "small_model.h"
+#include "small_plant.h"
 
 #define HEARTBEAT 5U
 #define HASH 0x89ABCDEFUL
@@ -272,6 +272,40 @@ static void a_node_refuses_contradictions(void **state)
     assert_status(HG_OK, hg_node_start(&r.self, &usual, &r.memory, HG_START_REST));
 }
 
+/* The node's own frames begin as frame.h draws them, and the closing frame has a counter. */
+static void a_node_refuses_other_headers_of_its_own(void **state)
+{
+    (void)state;
+    static rig r;
+    begin(&r, HG_START_REST);
+    hg_e2e_config other[4] = {rules[2], rules[2], rules[2], rules[2]};
+    other[0].profile = HG_E2E_P02;
+    other[1].crc = 7U;
+    other[2].counter = 16U;
+    other[3].stamp = HG_E2E_NO_STAMP;
+    for (size_t i = 0U; i < COUNT(other); i++) {
+        hg_message message = verdict_message;
+        hg_node_config c[2] = {usual, usual};
+        message.e2e = &other[i];
+        c[0].verdict = &message;
+        c[1].status = &message;
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c[0], &r.memory, HG_START_REST));
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c[1], &r.memory, HG_START_REST));
+    }
+    hg_e2e_config uncounted[2] = {rules[1], rules[1]};
+    uncounted[0].profile = HG_E2E_NONE;
+    uncounted[1].ignore = HG_E2E_IGNORE_COUNTER;
+    for (size_t i = 0U; i < COUNT(uncounted); i++) {
+        hg_message message[SM_GROUPS] = {messages[0], messages[1]};
+        hg_node_config c = usual;
+        c.message = message;
+        message[0].e2e = &uncounted[i];
+        assert_status(HG_OK, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+        message[1].e2e = &uncounted[i];
+        assert_status(HG_E_CONFIG, hg_node_start(&r.self, &c, &r.memory, HG_START_REST));
+    }
+}
+
 /* ---- frames into a node ---- */
 
 static void samples_follow_one_another_and_the_index_wraps(void **state)
@@ -368,13 +402,15 @@ static void a_damaged_frame_is_refused_and_counts_as_lost(void **state)
         }
         assert_int_equal(8 * frame.length, hg_node_health(&r.self, group)->crc);
     }
-    /* Windows of 8 events, left with at most 2 damaged ones: 4 good frames and an expired deadline (interval 4) do not do. The clock is always
-       trusted. */
+    /* Windows of 8 events, left with at most 2 damaged ones: 4 good frames and an expired deadline (interval 4) do not do; 3 good frames and as many
+       expired deadlines (interval 1) do. What closes the samples tells the time all the while. */
     for (uint32_t k = 1U; k <= 4U; k++) {
         assert_status(HG_E_STATE, give(&r, 0U, k, 0, 0));
-        assert_status(HG_OK, give(&r, 1U, k, 0, 0));
+        assert_status((k < 4U) ? HG_E_STATE : HG_OK, give(&r, 1U, k, 0, 0));
         step(&r, k);
         assert_int_equal(k, hg_node_health(&r.self, 0U)->untrusted);
+        assert_int_equal((k < 4U) ? k : 3U, hg_node_health(&r.self, 1U)->untrusted);
+        assert_real((k < 4U) ? SM_SLEW(k) : R(SM_HALF), r.self.detector.radius[2]);
     }
     assert_int_equal(HG_E2E_INVALID, r.link[0].machine.state);
     sample(&r, 5U, 0, 0, 0);
@@ -489,6 +525,26 @@ static void a_measurement_of_another_sample_is_never_booked(void **state)
     }
 }
 
+/* Whatever its stamp says, with that check off it is of the sample that is open. */
+static void a_stamp_may_be_ignored(void **state)
+{
+    (void)state;
+    static rig r;
+    hg_e2e_config careless = rules[0];
+    careless.ignore = HG_E2E_IGNORE_STAMP;
+    hg_message loose[SM_GROUPS] = {messages[0], messages[1]};
+    loose[0].e2e = &careless;
+    hg_node_config config = usual;
+    config.message = loose;
+    begin_with(&r, &config, HG_START_REST);
+    for (uint32_t k = 0U; k < 40U; k++) {
+        assert_status(HG_OK, give(&r, 0U, 5U * k, 10, 10));
+        assert_status(HG_OK, give(&r, 1U, k, 10, 0));
+        step(&r, k);
+        assert_int_equal(HG_BUS_GOOD, bus(&r, 0U));
+    }
+}
+
 /* Samples of the closing frame alone. */
 static void ticks(rig *r, uint32_t from, uint32_t to)
 {
@@ -536,6 +592,21 @@ static void a_counter_that_jumped_is_refused_once(void **state)
             ticks(&r, 1U + silent, 2U + silent);
             assert_status(HG_OK, give(&r, 0U, 2U + silent, 0, 0)); /* the next is compared with the refused one */
         }
+    }
+}
+
+/* After a silence in which more frames can have been sent than any step can say, every counter fits. */
+static void after_a_very_long_silence_any_counter_fits(void **state)
+{
+    (void)state;
+    for (uint8_t lost = 0U; lost < 16U; lost++) {
+        static rig r;
+        begin(&r, HG_START_REST);
+        sample(&r, 0U, 0, 0, 0);
+        r.link[0].k -= 70000U + lost;
+        r.counter[0] = (uint8_t)(r.counter[0] + lost);
+        assert_status(HG_OK, give(&r, 0U, 1U, 0, 1));
+        assert_int_equal(lost, hg_node_health(&r.self, 0U)->lost);
     }
 }
 
@@ -828,44 +899,6 @@ static void two_nodes_share_tables_and_nothing_else(void **state)
     }
 }
 
-/* A healthy plant that moves within its bounds, and its senders. */
-typedef struct {
-    uint32_t  random;
-    double    s1;
-    double    s2;
-    double    slope;
-    hg_sender sender[SM_GROUPS];
-    int32_t   codes[SM_GROUPS][4];
-} plant;
-
-static void plant_senders(plant *p)
-{
-    static const hg_sender_config config[SM_GROUPS] = {{.message = &messages[0], .trigger = &sm_trigger_a},
-                                                       {.message = &messages[1], .trigger = &sm_trigger_b}};
-    for (size_t i = 0U; i < SM_GROUPS; i++) {
-        assert_status(HG_OK, hg_sender_start(&p->sender[i], &config[i], p->codes[i]));
-    }
-}
-
-static void plant_begin(plant *p, uint32_t seed)
-{
-    *p = (plant){.random = seed, .s1 = 3.0, .s2 = -2.0};
-    plant_senders(p);
-}
-
-/* The next sample; value[0] is what group 0 sends, value[1] what group 1 does. */
-static void plant_move(plant *p, bool fault, hg_real value[SM_GROUPS][2])
-{
-    p->slope = ((draw(&p->random) % 15U) == 0U) ? ((double)draw_between(&p->random, -3, 3) * 0.0625) : p->slope;
-    p->s2 += (fabs(p->s2 + p->slope) < 40.0) ? p->slope : 0.0;
-    const double move = (double)draw_between(&p->random, -16, 16) / 64.0;
-    p->s1 += (fabs(p->s1 + move) < 40.0) ? move : 0.0;
-    const double d = (double)draw_between(&p->random, -15, 15) / 1024.0;
-    value[0][0] = R(p->s2 + d + (fault ? 4.0 : 0.0));
-    value[0][1] = R(p->s1);
-    value[1][0] = R(p->s2);
-}
-
 /* One sample over a link that loses nothing, or everything; the status of the closing frame. */
 static hg_status plant_sample(plant *p, rig *r, uint32_t k, bool fault, bool sent)
 {
@@ -911,14 +944,15 @@ static void a_leap(uint32_t seed, uint32_t leap, int32_t by, bool anew)
     uint32_t wait = 0U;
     bool found = false;
     begin(&r, HG_START_MOVING);
-    plant_begin(&p, seed);
+    plant_begin(&p, messages, seed);
     for (uint32_t i = 0U; i < 160U; i++, k++) {
         if (i == leap) {
             k = anew ? 0U : (uint32_t)((int32_t)k + by);
             wait = 4U;
         }
         if ((i == leap) && anew) {
-            plant_senders(&p);
+            plant_sender(&p, 0U);
+            plant_sender(&p, 1U);
         }
         const bool fault = i >= 140U;
         const hg_status status = plant_sample(&p, &r, k, fault, true);
@@ -959,7 +993,7 @@ static void an_outage_that_is_told_is_no_plant_fault(void **state)
         const uint32_t last = first + 8U + (i % 33U); /* the first sample after 8 .. 40 lost ones */
         bool found = false;
         begin(&r, ((i & 1U) != 0U) ? HG_START_REST : HG_START_MOVING);
-        plant_begin(&p, seed + i);
+        plant_begin(&p, messages, seed + i);
         for (uint32_t k = 0U; k < 160U; k++) {
             const bool fault = k >= 140U;
             const bool sent = (k < first) || (k >= last);
@@ -1122,7 +1156,7 @@ static void abuse(uint32_t seed, bool deadline, unsigned restarts[1], unsigned p
     bool confirmed = false;
     hg_can_frame straggler = {.id = 0x7FFU};
     begin(&r, ((seed & 1U) != 0U) ? HG_START_REST : HG_START_MOVING);
-    plant_begin(&p, seed);
+    plant_begin(&p, messages, seed);
     for (uint32_t k = 0U; k < 700U; k++) {
         const bool fault = k >= 600U;
         hg_real value[SM_GROUPS][2];
@@ -1522,6 +1556,7 @@ int main(void)
         cmocka_unit_test(what_cannot_be_sent_goes_out_as_invalid),
         cmocka_unit_test(a_node_refuses_null),
         cmocka_unit_test(a_node_refuses_contradictions),
+        cmocka_unit_test(a_node_refuses_other_headers_of_its_own),
         cmocka_unit_test(samples_follow_one_another_and_the_index_wraps),
         cmocka_unit_test(foreign_frames_are_not_ours),
         cmocka_unit_test(a_frame_of_wrong_kind_or_length_is_refused_and_counts_as_lost),
@@ -1531,8 +1566,10 @@ int main(void)
         cmocka_unit_test(a_duplicate_is_counted_and_harmless),
         cmocka_unit_test(a_second_frame_of_one_sample_is_no_duplicate_but_a_loss),
         cmocka_unit_test(a_measurement_of_another_sample_is_never_booked),
+        cmocka_unit_test(a_stamp_may_be_ignored),
         cmocka_unit_test(lost_frames_are_counted_by_the_sequence),
         cmocka_unit_test(a_counter_that_jumped_is_refused_once),
+        cmocka_unit_test(after_a_very_long_silence_any_counter_fits),
         cmocka_unit_test(a_missing_tick_is_a_step),
         cmocka_unit_test(one_late_tick_is_a_straggler),
         cmocka_unit_test(old_ticks_between_leave_the_others_in_step),

@@ -129,6 +129,7 @@ hg_status hg_e2e_check(const hg_e2e_config *config, const uint8_t *data, uint8_t
 typedef struct {       /* RAM: one a received message */
     uint16_t crc;      /* of the last frame whose checksum was good */
     uint8_t  counter;  /* its counter */
+    uint8_t  stamp;    /* its stamp: a checksum of 8 bits may by chance be that of another sample's frame */
     uint8_t  resync;   /* frames in sequence to refuse yet */
     bool     seen;     /* has there been one? */
 } hg_e2e_receiver;

@@ -9,14 +9,16 @@
  *  Stamps. The project's own frames carry k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated
  *  as lost, never booked to the wrong sample. Its counter may have moved by as many frames as the sender can have sent since the last good one
  *  and no further. A frame without a stamp, of a vehicle's own network, belongs to the sample that is open when it comes: its radii must allow
- *  for that (the design's skew).
+ *  for that (the design's skew). Where a closing frame is missing, too, it may be of a later sample: the detector then begins again, unless the
+ *  application's clock has closed the sample in time with hg_node_overdue().
  *  A closing frame j <= 7 ahead makes j steps without it first. One that is late, or whose counter has not moved with its sample, is refused;
  *  two such running that agree with each other (and, where the application has a clock, with the samples it closed as overdue in between:
  *  old frames sent once more come in a burst) are of a sender that began anew or of one this node has lost: the detector restarts at the
  *  sender's sample with nothing known of any group. The sample index never goes back. More than 7 closing frames lost in a row read as fewer,
  *  or as none: the application, which has a clock, must have called hg_node_overdue() for each, or call hg_node_outage(). Otherwise an
  *  alarm after such an outage may be false. Closing frames without a stamp are timed by their counter alike.
- *  A link that has seen too many damaged frames is not trusted until good ones came (e2e.h, INVALID); closing frames are, they are the clock.
+ *  A link that has seen too many damaged frames is not trusted until good ones came (e2e.h, INVALID). A closing frame that is not, or whose numbers
+ *  are out of range, still tells the time, and its numbers count as lost. What may come and what becomes of it: the table in firmware/README.md.
  *  Not reentrant per instance. hg_inbox is the one structure that an interrupt may share with the main loop. */
 #ifndef HULLGUARD_NODE_H
 #define HULLGUARD_NODE_H
@@ -39,7 +41,8 @@ typedef struct {                       /* RAM: one a group */
     uint8_t                 counter;   /* of the next frame */
 } hg_sender;
 
-/** Begin before the first sample.
+/** Begin before the first sample. A sender that begins anew while others listen (its ECU has restarted) first keeps silent for interval_max samples:
+ *  its counter may by chance continue the old one, and only that silence tells receivers that its promise was broken meanwhile.
  *  @param[in] codes  [2 width] memory, owned by the caller
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
@@ -105,7 +108,7 @@ typedef struct {                /* RAM: one a node */
     int32_t        *closing;    /* [width of the closing group] codes waiting for their sample */
     uint32_t        k;          /* the open sample */
     uint32_t        unknown;    /* frames with an identifier that is not the model's */
-    uint32_t        overdue;    /* samples closed without their closing frame */
+    uint32_t        overdue;    /* samples closed without the numbers of their closing frame */
     uint8_t         due;        /* steps to make */
     bool            held;       /* closing[] waits for the last of them */
     bool            continues;  /* and its sequence counter continued */
@@ -140,7 +143,7 @@ typedef struct {                /* owned by the caller; one storage type a model
 hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_node_memory *memory, hg_start how);
 
 /** Take a frame from the bus, whatever it is. Every refusal is counted in the group's link, and a refused or damaged frame of a group counts as lost.
- *  @retval HG_OK          booked; after the closing frame hg_node_step() has work
+ *  @retval HG_OK          booked; after the closing frame hg_node_step() has work, and after one that is HG_E_STATE or HG_E_NUMERIC
  *  @retval HG_E_ID        not a frame of this model
  *  @retval HG_E_FORMAT    wrong length or kind
  *  @retval HG_E_CRC       damaged
