@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import can
+
 from hullguard.bus.link import from_message, to_message
 from hullguard.inject import Injector, parse_directive, read_codec
 
