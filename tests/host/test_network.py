@@ -661,3 +661,30 @@ def test_a_receiver_counts_what_the_vehicles_profile_tells(network: Design, nati
         source.move()
     health = node.health()
     assert (health["crc"], health["lost"]) == (2, 3)
+
+
+def test_checks_are_on_unless_the_model_turns_them_off() -> None:
+    made = design(load_model("platoon"))[0]
+    assert all(g.message.protection.ignore == () and g.message.protection.resync == 0 for g in made.tables.groups)
+    loose = design(load_model("platoon", {"groups.measurement.rules": {"ignore": ["crc", "state"], "resync": 2}}))[0]
+    rules = {g.name: g.message.protection for g in loose.tables.groups}
+    assert (rules["measurement"].ignore, rules["measurement"].resync) == (("crc", "state"), 2) and rules["control"].ignore == ()
+    text = emit_c(loose)[1]
+    assert ".ignore = HG_E2E_IGNORE_CRC | HG_E2E_IGNORE_STATE" in text and ".resync = 2U" in text
+    native = Native(library("f32"), loose.tables)
+    assert (native.messages[0].e2e.ignore, native.messages[0].e2e.resync, native.messages[1].e2e.ignore) == (0x01 | 0x08, 2, 0)
+
+
+@pytest.mark.parametrize(
+    ("group", "rules", "said"),
+    [
+        ("measurement", {"ignore": ["counter"]}, "looks like silence"),
+        ("control", {"ignore": ["counter"]}, "is the clock"),
+        ("measurement", {"ignore": ["stamp"]}, "'stamp' is no check"),
+        ("measurement", {"resync": 16}, "resync"),
+        ("measurement", {"limits": 1}, "limits"),
+    ],
+)
+def test_rules_that_cannot_be(group: str, rules: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        load_model("platoon", {f"groups.{group}.rules": rules})

@@ -134,7 +134,7 @@ def main() -> int:
     batch = Batch(native, made, len(series), REST, seed=SEED, start=MOVING, series=series, noise=True)
     result = batch.runs(0, 1)[0]
     trace = batch.trace(0)
-    _, every, measured = periodic_bits(made, native, trace["reading"].tolist())
+    _, every, measured, _ = periodic_bits(made, native, trace["reading"].tolist())
     groups = len(made.model.groups) - 1
     print(f"fault-free: {result['false_provisional']} provisional and {result['false_confirmed']} confirmed false alarms, largest |r|/J {result['margin']:.3f}")
     print(f"measurement frames: {100 * result['measurement'] / groups / len(series):.1f} % of periodic, intervals {result['interval_min']}..{result['interval_max']}")

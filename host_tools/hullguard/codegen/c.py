@@ -317,7 +317,7 @@ def _protection(p: ProtectionTable, n: str) -> list[str]:
         *comment(f"{n}_e2e: protection, places in bits from the first of byte 0 on"),
         f"static const hg_e2e_config {n}_e2e = {{",
         f"    .profile = HG_E2E_{p.profile.upper()}, .mode = HG_E2E_{p.mode.upper()}, .data_id = 0x{p.data_id:04X}U, .data_ids = {ids},",
-        f"    .crc = {p.crc}U, .ignore = {ignore}, .counter = {p.counter}U, .nibble = {p.nibble}U, .stamp = {stamp}, .resync = 0U,",
+        f"    .crc = {p.crc}U, .ignore = {ignore}, .counter = {p.counter}U, .nibble = {p.nibble}U, .stamp = {stamp}, .resync = {p.resync}U,",
         "    .limits = &hg_e2e_limits_default,",
         "};",
         "",

@@ -29,6 +29,7 @@ def protection(library: Library, table: ProtectionTable) -> tuple[Any, list[Any]
     config.data_id, config.crc, config.counter = table.data_id, table.crc, table.counter
     config.nibble, config.stamp = table.nibble, table.stamp
     config.ignore = sum(IGNORE[name] for name in table.ignore)
+    config.resync = table.resync
     config.limits = ffi.addressof(lib.hg_e2e_limits_default)
     if table.data_ids:
         kept.append(ffi.new("uint8_t[]", list(table.data_ids)))

@@ -41,7 +41,8 @@ class ProtectionTable:
     mode: str  # "both" | "alternate" | "low" | "nibble" (P01, P11)
     data_id: int  # P01, P05, P11
     data_ids: tuple[int, ...]  # P02, P22: 16 bytes; else ()
-    ignore: tuple[str, ...]  # of "crc", "counter", "stamp"
+    ignore: tuple[str, ...]  # of "crc", "counter", "stamp", "state": checks that are off
+    resync: int = 0  # good frames in sequence that are refused after a jump of the counter
 
     @property
     def modulus(self) -> int:

@@ -317,7 +317,13 @@ def _own_layout(model: Model, group: Group, profile: str) -> tuple[list[SignalTa
 
 
 def _layout(model: Model, group: Group) -> tuple[list[SignalTable], MessageTable]:
-    """Signals and frame of a group: the vehicle's, or the project's own, by profile 05 where that of 8 bits is not sure of three flipped bits."""
+    """Signals and frame of a group, with the checks that the model leaves on."""
+    signals, message = _placed(model, group)
+    return signals, replace(message, protection=replace(message.protection, ignore=group.ignore, resync=group.resync))
+
+
+def _placed(model: Model, group: Group) -> tuple[list[SignalTable], MessageTable]:
+    """The vehicle's frame, or the project's own, by profile 05 where that of 8 bits is not sure of three flipped bits."""
     frame, wire = group.frame, group.frame.wire
     if wire is not None:
         signals = [field_table(model.signals[i], f, group.applied_as_sent) for i, f in zip(group.signals, wire.fields, strict=True)]

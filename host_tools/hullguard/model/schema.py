@@ -31,6 +31,7 @@ GENERATORS_MAX = 32
 FAULTS_MAX = 32
 GROUP_SIGNALS_MAX = 32
 PERIOD_MAX = 190  # samples; with the widest margin, what a receiver's age can count
+IGNORABLE = ("crc", "counter", "state")  # checks of a group's protection that a model may turn off
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,8 @@ class Group:
     closing: bool
     applied_as_sent: bool
     skew: int = 0  # samples: a value may be that much older, or by the sender's own clock newer, than the sample it is booked to
+    ignore: tuple[str, ...] = ()  # checks of its protection that are off
+    resync: int = 0  # good frames refused after a jump of its counter
 
     @property
     def horizon(self) -> int:
@@ -558,10 +561,26 @@ def _read_group(t: Table, places: tuple[int, ...], members: list[Signal], wire: 
         empty = np.zeros((1, width))
         trigger = Trigger(empty, empty, (period - 1,), period, empty, margin)
     skew = t.whole("skew_samples", 0, 16, 0 if frame.stamped or transmission == "tick" else 1)
-    group = Group(_name(t, "verdict", "status"), places, frame, trigger, transmission == "tick", applied, skew)
+    group = Group(_name(t, "verdict", "status"), places, frame, trigger, transmission == "tick", applied, skew, *_read_rules(t, frame, transmission))
     _check_stamp(t, group)
     t.close()
     return group
+
+
+def _read_rules(t: Table, frame: Frame, transmission: str) -> tuple[tuple[str, ...], int]:
+    """Checks of the protection that are off, none unless the model says so, and the frames refused after a jump of the counter."""
+    rules = t.table("rules", optional=True)
+    ignore = tuple(rules.names("ignore", ()))
+    for name in ignore:
+        if name not in IGNORABLE:
+            raise rules.error("ignore", f"'{name}' is no check; choose of {', '.join(IGNORABLE)}")
+        if not frame.protected:
+            raise rules.error("ignore", "the frame has no protection to be ignored; remove it")
+    if "counter" in ignore and transmission != "periodic":
+        raise rules.error("ignore", "without the counter a lost frame looks like silence, which is a promise, and the closing frame is the clock: periodic groups only")
+    resync = rules.whole("resync", 0, 15, 0)
+    rules.close()
+    return ignore, resync
 
 
 def _read_period(t: Table, wire: Wire | None, closing: bool, sample_time_s: float) -> int:
