@@ -15,7 +15,7 @@ coverage: $(REALS:%=$(COVERAGE)/%/ran) ## line and branch coverage of the librar
 define coverage_variant
 $(eval $(call objects,$(COVERAGE)/$(1),$(COVERED) $(UNIT_TESTS:%=tests/unit/%.c),$$(CC) -O0 -g --coverage $(REAL_FLAG_$(1))))
 $(UNIT_TESTS:%=$(COVERAGE)/$(1)/%): $(COVERAGE)/$(1)/%: $(COVERAGE)/$(1)/tests/unit/%.o $(COVERED:%.c=$(COVERAGE)/$(1)/%.o)
-	$$(CC) --coverage -o $$@ $$^ -lcmocka -lm
+	$$(Q)$$(CC) --coverage -o $$@ $$^ -lcmocka -lm
 $(COVERAGE)/$(1)/ran: $(UNIT_TESTS:%=$(COVERAGE)/$(1)/%)
 	@find $(COVERAGE)/$(1) -name '*.gcda' -delete
 	@for test in $$^; do $$$$test >$$$$test.log 2>&1 || { cat $$$$test.log; echo "FAILED $$$$test"; exit 1; }; done
