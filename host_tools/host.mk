@@ -26,8 +26,14 @@ openacc: ## the openacc model on a recorded drive: make openacc DATA=FILE.csv
 openacc-generated: lib
 	@$(PY) tests/openacc/openacc.py --generated --misses $(BUILD)/openacc-generated-misses.txt
 
-.PHONY: pytest
-pytest: lib apps with-vcan $(BUILD)/oracle/oracle_run ## tests of the host tools, and of the node on vcan (HULLGUARD_SEED=n: other random cases)
-	@HULLGUARD_SEED=$${HULLGUARD_SEED:-1} $(PY) -m pytest -q -p no:cacheprovider tests/host tests/node
+# Two processes, so that `make -j` has something for each core.
+PYTEST = HULLGUARD_SEED=$${HULLGUARD_SEED:-1} $(PY) -m pytest -q -p no:cacheprovider
 
-TEST_PARTS += apps pytest openacc-generated lint coverage
+.PHONY: pytest pytest-host pytest-node
+pytest: pytest-host pytest-node ## tests of the host tools, and of the node on vcan (HULLGUARD_SEED=n: other random cases)
+pytest-host: lib apps with-vcan $(BUILD)/oracle/oracle_run
+	@$(PYTEST) tests/host
+pytest-node: lib apps with-vcan $(BUILD)/oracle/oracle_run
+	@$(PYTEST) tests/node
+
+TEST_PARTS += apps pytest-host pytest-node openacc-generated lint coverage

@@ -1,4 +1,4 @@
-# The node on vcan: a sender and a reference timer in C for test_timing.py; and detector_node in virtual time. `make pytest` runs what is in this
+# The node on vcan: a sender and a reference timer in C for test_timing.py; and detector_node in virtual time. `make pytest-node` runs what is in this
 # folder.
 
 BUS_TIMER := $(BUILD)/node/bus_timer
@@ -15,4 +15,4 @@ $(BUS_TIMER): $(BUS_TIMER).o $(BUS_TIMER_OBJECTS)
 $(VIRTUAL_NODE): $(VIRTUAL_NODE).o $(VIRTUAL_NODE_OBJECTS)
 	$(Q)$(CC) -o $@ $^
 
-pytest: $(BUS_TIMER) $(VIRTUAL_NODE)
+pytest-node: $(BUS_TIMER) $(VIRTUAL_NODE)
