@@ -146,6 +146,9 @@ class Clock:
     def monotonic(self) -> float:
         return self.now
 
+    def time(self) -> float:
+        return self.now
+
     def receive(self, timeout_s: float) -> tuple[Frame, float] | None:
         if self._frames and self._frames[0][0] <= self.now + timeout_s:
             self.now, frame = self._frames.pop(0)
@@ -154,8 +157,9 @@ class Clock:
         return None
 
 
+@pytest.mark.parametrize("foreign", [0, 8], ids=["quiet", "flooded"])
 @pytest.mark.parametrize("count", [1, 3, 7])
-def test_detect_closes_overdue_samples_at_their_deadline(count: int, models: Models, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_detect_closes_overdue_samples_at_their_deadline(count: int, foreign: int, models: Models, monkeypatch: pytest.MonkeyPatch) -> None:
     """Half a period after a closing frame was due, and every period from then on; with the next one everything is as before."""
     design, native = made(models, "platoon", "rest")
     T, first, samples, start = 0.125, 20, 40, 1.0  # sums of powers of two: no rounding
@@ -168,7 +172,8 @@ def test_detect_closes_overdue_samples_at_their_deadline(count: int, models: Mod
             frame = sender.step(g, k, reading)
             if frame is not None and not (g == 1 and first <= k < first + count):
                 frames.append((start + k * T, frame))
-    clock = Clock(frames)
+    frames += [(start + i * T / foreign, Frame(0x7FF, 0, b"")) for i in range(samples * foreign)]  # without them, deadlines have the bus to themselves
+    clock = Clock(sorted(frames, key=lambda f: f[0]))
     monkeypatch.setattr(detect, "time", clock)
     closed: list[tuple[int, float]] = []
     detector = Detector(native, REST, False, None, lambda v: closed.append((v.k, clock.now)), T)

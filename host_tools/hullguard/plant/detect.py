@@ -11,6 +11,7 @@ from hullguard.core.native import Frame, Native, Node, Verdict
 
 OK = 1  # hg_status
 
+STAMP_AGE_S = 10.0  # older ones are of another clock
 STAMPS = 7  # samples ahead that a stamp can tell
 
 
@@ -68,17 +69,29 @@ def from_log(detector: Detector, entries: Iterable[candump.Entry], samples: int)
 
 
 def from_bus(detector: Detector, link: CanLink, period_s: float, deadline: bool, samples: int, stop: Callable[[], bool]) -> None:
-    """Feed frames as they come until `samples` have passed (0: for ever) or `stop` says so. An overdue closing frame closes its sample."""
+    """Feed frames as they come until `samples` have passed (0: for ever) or `stop` says so. An overdue closing frame closes its sample.
+
+    A frame that arrived behind the deadline says that nothing in time is waiting any more, so a flood of foreign frames holds nothing up.
+    """
     next_close: float | None = None
     while not stop() and (samples == 0 or detector.samples < samples):
         wait = 0.2 if next_close is None else min(0.2, max(0.0, next_close - time.monotonic()))
         got = link.receive(wait)
+        arrived = time.monotonic() if got is None else _arrival(got[1])
         before = detector.samples
+        late = next_close is not None and arrived >= next_close
+        if late:
+            detector.overdue()
+        closed = detector.samples
         if got is not None:
             detector.take(got[0], got[1] or time.monotonic())
-        elif next_close is not None and time.monotonic() >= next_close:
-            detector.overdue()
         if deadline and detector.samples != before:
             # Half a period of patience: a closing frame may be late, not absent.
-            base = time.monotonic() if got is not None or next_close is None else next_close - 0.5 * period_s
+            base = next_close - 0.5 * period_s if late and next_close is not None and detector.samples == closed else time.monotonic()
             next_close = base + 1.5 * period_s
+
+
+def _arrival(stamp: float) -> float:
+    """A frame's time stamp, where it is one of this machine's clock, by the clock that deadlines go by."""
+    age = time.time() - stamp
+    return time.monotonic() - (age if 0.0 <= age < STAMP_AGE_S else 0.0)
