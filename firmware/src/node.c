@@ -238,6 +238,26 @@ static bool agrees(const hg_node *self, const hg_e2e_header *header)
     return self->slipped && paced && (frames >= 1U) && (frames <= STAMP_AHEAD_MAX) && ((!stamped(e2e)) || (samples == frames));
 }
 
+/* A closing frame of a sample that was closed without it, late but no old one, has been received all the same: it is no lost frame, and the
+ * next one goes on from it. */
+static void note_straggler(hg_node *self, const hg_e2e_header *header)
+{
+    const uint8_t closing = self->config->closing;
+    const hg_e2e_config *e2e = self->config->message[closing].e2e;
+    const uint32_t modulus = hg_e2e_modulus(e2e);
+    const uint32_t frames = ((header->counter + modulus) - self->closing_counter) % modulus;
+    const uint32_t without = (self->k - 1U) - self->closing_k; /* samples closed since the last one */
+    const uint32_t k = self->closing_k + frames;
+    const bool stamp_fits = (!stamped(e2e)) || (header->stamp == (k & STAMP_MASK));
+    if (self->closed && (frames >= 1U) && (frames <= without) && stamp_fits) {
+        hg_e2e_progress progress = {.lost = 0U, .continues = false};
+        (void)hg_e2e_sequence(e2e, &self->link[closing].receiver, header, HG_E2E_ANY_STEP, &progress);
+        raise16(&self->link[closing].health.lost, progress.lost);
+        self->closing_counter = header->counter;
+        self->closing_k = k;
+    }
+}
+
 static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint8_t ahead)
 {
     hg_link_health *health = &self->link[self->config->closing].health;
@@ -246,6 +266,7 @@ static hg_status refuse_closing(hg_node *self, const hg_e2e_header *header, uint
     self->slipped_counter = header->counter;
     self->slipped_stamp = header->stamp;
     self->slipped_k = self->k;
+    note_straggler(self, header);
     if (ahead > STAMP_AHEAD_MAX) {
         raise16(&health->late, 1U);
         status = HG_E_STAMP;

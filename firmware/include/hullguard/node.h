@@ -119,7 +119,7 @@ typedef struct {                /* RAM: one a node */
     uint32_t        slipped_k;  /* the sample that was open then */
     bool            clocked;    /* the application has a clock: it has called hg_node_overdue() or hg_node_expect() */
     bool            closed;     /* has a closing frame been accepted? */
-    uint8_t         closing_counter; /* the last accepted one's sequence counter */
+    uint8_t         closing_counter; /* of the last one accepted, or late in its sequence: its counter */
     uint32_t        closing_k;  /* and its sample */
     uint8_t         ahead_max;  /* samples that a closing frame can be ahead */
     bool            reported;   /* has a verdict frame been handed out? */
