@@ -234,9 +234,9 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; its exit status. Errors are one line on stderr that names the cause and the cure."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    args = build_parser().parse_args(given)
-    args.arguments = given
     try:
+        args = build_parser().parse_args(given)  # what it imports takes long enough for a Ctrl-C
+        args.arguments = given
         return _commands()[args.command](args)
     except HullguardError as error:
         print(f"hullguard: {error}", file=sys.stderr)

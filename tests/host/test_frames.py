@@ -158,6 +158,47 @@ def test_residual_rates_by_trying_all(profile: str, length: int) -> None:
 
 
 @pytest.mark.parametrize(
+    ("spec", "kind"),
+    [
+        ("spoof:message=measurement@period=1", VALID),
+        ("spoof:message=measurement,stamp=9@period=0.7", VALID),  # once in 16 samples it is the open one's
+        ("spoof:message=measurement,valid=yes@period=1", VALID),
+        ("spoof:message=measurement,valid=false@period=1", SEEN),
+        ("corrupt:bits=3", SEEN),
+        ("corrupt:bits=4", HEAVY),
+        ("corrupt:repair=yes", VALID),
+    ],
+)
+def test_classes(spec: str, kind: str) -> None:
+    assert case_of(spec).kind == kind
+
+
+@pytest.mark.parametrize("name", ["platoon_bank", "openacc"])
+def test_forged_frames_of_all_never_have_the_open_stamp(name: str) -> None:
+    made = designed(name)
+    cases = [c for c in all_cases(made.model, made.tables, codec_for(made), 20, 200) if "stamp=" in c.spec]
+    assert len(cases) == 4 and all(c.kind == SEEN for c in cases)
+    for c in cases:
+        course = Course(made.model.scenario(None), 200, 200, (), SEED, 0)
+        tally = FaultyRun(made, Native(library("f32"), made.tables), codec_for(made), c, course).go()
+        assert tally.counted["stamp"] == tally.injected > 0 and not differences(c, tally)
+
+
+def test_lost_closing_frames_are_counted_past_a_turn_of_the_counter() -> None:
+    made = designed("platoon")
+    case = case_of("silence:lasts=3.05@id=control,k=40..41")  # 30 samples, the counter has 16 values
+    course = Course(made.model.scenario("rest"), 120, 60, (), SEED, 0)
+    tally = FaultyRun(made, Native(library("f32"), made.tables), codec_for(made), case, course).go()
+    assert tally.health["lost"] == tally.told["lost"] == tally.injected > 16 and not differences(case, tally)
+
+
+def test_a_run_is_long_enough_for_the_scenarios_own_fault() -> None:
+    status, out, _ = command("campaign", "platoon", "--inject", "duplicate@p=0.1", "--runs", 2, "--workers", 1, "--json", "-q")
+    result = json.loads(out)
+    assert status == 0 and result["faults"] and result["tampered_until"] > 150
+
+
+@pytest.mark.parametrize(
     ("options", "said"),
     [
         (("--inject", "bogus@p=0.1"), "bogus"),

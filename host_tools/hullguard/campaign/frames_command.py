@@ -22,6 +22,7 @@ from hullguard.commands import emit, make_folder, prepared, progress, say, the_f
 from hullguard.design.design import Design
 from hullguard.errors import ExpectationError, InputError
 from hullguard.inject.engine import Injector
+from hullguard.model.schema import Scenario
 
 ALL = "all"
 SAID = {"stamp": "early or late"}
@@ -38,7 +39,7 @@ def run_frames(args: argparse.Namespace) -> int:
             raise InputError(f"--{name.replace('_', '-')} and --inject do not go together: faulty frames are made one by one; use a campaign of its own for each")
     model, made = prepared(args)
     scenario = model.scenario(args.scenario)
-    samples = args.samples or scenario.samples
+    samples = args.samples or _samples(args, scenario)
     end = samples // 2
     faults = the_faults(args, model, scenario.faults, samples)
     if any(f.start >= end for f in faults):
@@ -75,6 +76,12 @@ def run_frames(args: argparse.Namespace) -> int:
     if failed:
         raise ExpectationError("; ".join(failed[:3]) + (f"; and {len(failed) - 3} more" if len(failed) > 3 else ""))
     return 0
+
+
+def _samples(args: argparse.Namespace, scenario: Scenario) -> int:
+    """Length of a run where none is asked for: the scenario's, or more, so that its own faults begin while frames are tampered with."""
+    own = [] if args.no_fault or args.fault else scenario.faults
+    return max([scenario.samples, *(3 * f.start for f in own)])
 
 
 def _cases(args: argparse.Namespace, made: Design, end: int) -> list[FrameCase]:
