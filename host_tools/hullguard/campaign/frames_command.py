@@ -76,7 +76,8 @@ def run_frames(args: argparse.Namespace) -> int:
     if together["tried"]:
         low, high = together["interval"]
         say(args, f"of {together['tried']} heavily damaged frames {together['passed']} passed the checksum, expected {together['expected']:.1f} ({low} .. {high})")
-    say(args, f"{result['injected']} faulty frames in {result['runs']} runs of {samples} samples, {time.monotonic() - began:.0f} s; frames are tampered with until sample {end} where nothing else is said")
+    said = f"{result['injected']} faulty frames in {result['runs']} runs of {samples} samples, {time.monotonic() - began:.0f} s"
+    say(args, f"{said}; frames are tampered with until sample {end} where nothing else is said")
     emit(args, result)
     if failed:
         raise ExpectationError("; ".join(failed[:3]) + (f"; and {len(failed) - 3} more" if len(failed) > 3 else ""))
