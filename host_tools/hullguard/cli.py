@@ -9,9 +9,8 @@ from typing import NoReturn
 
 from hullguard import __version__
 from hullguard.errors import HullguardError
-from hullguard.inject import arguments as inject
 
-STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
+STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C (0 where it is the way to end: detect, monitor, inject)
 """
 
 EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
@@ -94,6 +93,8 @@ def _drive(parser: argparse.ArgumentParser) -> None:
 
 def build_parser() -> argparse.ArgumentParser:
     """All options of all subcommands."""
+    from hullguard.inject import arguments as inject  # slow: what it needs is imported where a Ctrl-C is told in one line
+
     parser = _Parser(
         prog="hullguard", description="Event-triggered, set-based fault detection on ECUs over CAN.", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -534,7 +534,7 @@ def test_a_garbage_line_in_a_log_is_refused_with_its_number(cli: Cli, tmp_path: 
 
 def test_a_log_of_every_kind_of_foreign_frame_is_read_and_raises_no_alarm(cli: Cli, tmp_path: Path) -> None:
     path = tmp_path / "x.log"
-    lines = ["110#", "110#R", "00000110#0011223344556677", "110##10011223344556677", "20000040#0000000000000000", "7FF#00", "FFFFFFFF#00", "120#0011223344556677", "FFF#00"]
+    lines = ["110#", "110#R", "00000110#0011223344556677", "110##10011223344556677", "20000040#0000000000000000", "7FF#00", "FFFFFFFF#00", "120#0111223344556677", "FFF#00"]
     path.write_text("".join(f"({i}.0) vcan0 {x}\n" for i, x in enumerate(lines)), encoding="ascii")
     result = cli("detect", "platoon", "--log", path, "--json", "-q", "--expect", "quiet")
     assert result.status == DONE
