@@ -10,7 +10,7 @@ from typing import NoReturn
 from hullguard import __version__
 from hullguard.errors import HullguardError
 
-STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C (0 where it is the way to end: detect, monitor, inject)
+STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C (0 where that ends it: detect, monitor, inject)
 """
 
 EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
