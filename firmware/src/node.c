@@ -11,10 +11,10 @@
 #define VERDICT_LENGTH_WIDE 12U /* with room for candidates 31:16 */
 #define VERDICT_FAULTS 16U     /* candidates without that room */
 
-static void raise16(uint16_t *counter, uint16_t by)
+static void raise16(uint16_t *counter, uint32_t by)
 {
-    const uint32_t sum = (uint32_t)*counter + by;
-    *counter = (sum > UINT16_MAX) ? UINT16_MAX : (uint16_t)sum;
+    const uint32_t room = UINT16_MAX - (uint32_t)*counter;
+    *counter = (uint16_t)(*counter + ((by < room) ? by : room));
 }
 
 static void raise32(uint32_t *counter)
@@ -312,7 +312,8 @@ static hg_status close_sample(hg_node *self, const int32_t *code, const hg_e2e_h
     }
     hg_e2e_progress progress = {.lost = 0U, .continues = false};
     (void)hg_e2e_sequence(message->e2e, &link->receiver, header, HG_E2E_ANY_STEP, &progress); /* no repetition, and any step will do */
-    raise16(&link->health.lost, progress.lost);
+    /* In step with the time, as many are missing as samples, however often the counter has gone round meanwhile. */
+    raise16(&link->health.lost, (known && self->closed) ? (((self->k + ahead) - self->closing_k) - 1U) : 0U);
     self->synchronised = true;
     self->slipped = false;
     self->closed = true;

@@ -9,9 +9,8 @@ from typing import NoReturn
 
 from hullguard import __version__
 from hullguard.errors import HullguardError
-from hullguard.inject import arguments as inject
 
-STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C
+STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C (0 where that ends it: detect, monitor, inject)
 """
 
 EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
@@ -94,6 +93,8 @@ def _drive(parser: argparse.ArgumentParser) -> None:
 
 def build_parser() -> argparse.ArgumentParser:
     """All options of all subcommands."""
+    from hullguard.inject import arguments as inject  # slow: what it needs is imported where a Ctrl-C is told in one line
+
     parser = _Parser(
         prog="hullguard", description="Event-triggered, set-based fault detection on ECUs over CAN.", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -234,9 +235,9 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; its exit status. Errors are one line on stderr that names the cause and the cure."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    args = build_parser().parse_args(given)
-    args.arguments = given
     try:
+        args = build_parser().parse_args(given)  # what it imports takes long enough for a Ctrl-C
+        args.arguments = given
         return _commands()[args.command](args)
     except HullguardError as error:
         print(f"hullguard: {error}", file=sys.stderr)

@@ -23,7 +23,7 @@ import cantools
 import numpy as np
 import pandas as pd
 import pytest
-from host_support import SEED, Cli
+from host_support import ROOT, SEED, Cli
 from hullguard.bus import candump, convert, formats, pcap
 from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE, Entry
 from hullguard.core.native import Frame
@@ -136,12 +136,19 @@ def test_convert_tells_what_is_lost(cli: Cli, tmp_path: Path) -> None:
         (("text.blf", "b.log"), "text.blf"),
         (("text.mf4", "b.log"), "text.mf4"),
         (("text.pcap", "b.log"), "text.pcap"),
+        (("empty.pcap", "b.log"), "an empty file"),
+        (("a.log", "no/such/b.csv", "--dbc", "good.dbc"), "cannot be written"),
+        (("far.log", "b.pcap"), "cannot hold"),
+        (("far.log", "b.mf4"), "cannot hold"),
     ],
 )
 def test_convert_refuses_in_one_line(arguments: tuple[str, ...], words: str, cli: Cli, tmp_path: Path) -> None:
     formats.write(tmp_path / "a.log", entries(random.Random(SEED), 3))
     for name in ("text.blf", "text.mf4", "text.pcap", "a.xyz", "x.dbc"):
         (tmp_path / name).write_text("no recording at all, whatever its name may say")
+    (tmp_path / "empty.pcap").touch()
+    (tmp_path / "good.dbc").write_bytes((ROOT / "firmware" / "models" / "platoon.dbc").read_bytes())
+    (tmp_path / "far.log").write_text("(99999999999.000001) can0 110#11\n")
     done = cli("convert", *(tmp_path / a if "." in a else a for a in arguments))
     assert (done.status, done.out) == (2, "") and re.fullmatch(r"hullguard: [^\n]+\n", done.err) and words in done.err
 

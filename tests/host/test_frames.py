@@ -12,9 +12,10 @@ from itertools import combinations
 from pathlib import Path
 
 import pytest
-from host_support import PERIODIC, SEED
+from host_support import PERIODIC, ROOT, SEED
 from hullguard.campaign.frames import Course, FaultyRun, Tally
 from hullguard.campaign.frames_all import HEAVY, SEEN, VALID, all_cases, case_of
+from hullguard.campaign.frames_command import _judged
 from hullguard.campaign.frames_study import codec_for, differences, failures, residual_rate, row
 from hullguard.cli import main
 from hullguard.core.library import library
@@ -155,6 +156,69 @@ def test_residual_rates_by_trying_all(profile: str, length: int) -> None:
             passed += protector.check(bytes(data)) is not None
         expected = residual_rate(message, bits) * math.comb(8 * length, bits)
         assert passed == pytest.approx(expected, abs=1e-6) if profile != "P11" else passed <= expected + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("spec", "kind"),
+    [
+        ("spoof:message=measurement@period=1", VALID),
+        ("spoof:message=measurement,stamp=9@period=0.7", VALID),  # once in 16 samples it is the open one's
+        ("spoof:message=measurement,valid=yes@period=1", VALID),
+        ("spoof:message=measurement,valid=false@period=1", SEEN),
+        ("corrupt:bits=3", SEEN),
+        ("corrupt:bits=4", HEAVY),
+        ("corrupt:repair=yes", VALID),
+    ],
+)
+def test_classes(spec: str, kind: str) -> None:
+    assert case_of(spec).kind == kind
+
+
+@pytest.mark.parametrize(("profile", "kind"), [("P22", SEEN), ("P05", SEEN), ("P11", HEAVY)])
+def test_three_bits_are_seen_where_the_checksum_sees_them(profile: str, kind: str) -> None:
+    """e2e.h: with profiles 01 and 11 some errors of 3 bits pass."""
+    made = designed("platoon", {"groups.measurement.frame.protection": profile})
+    for bits, wanted in ((2, SEEN), (3, kind)):
+        assert _judged(case_of(f"corrupt:bits={bits}@id=measurement"), made, codec_for(made)).kind == wanted
+
+
+def test_a_directive_without_a_time_gets_the_windows() -> None:
+    """What is dropped before the first frame or after the last one, no counter can tell."""
+    status, out, _ = command("campaign", "platoon", "--scenario", "rest", "--inject", "drop@p=0.5", "--inject", "error@period=0.5", "--runs", 4, "--workers", 1, "--json", "-q")
+    found = json.loads(out)["rows"]
+    assert status == 0 and [r["spec"] for r in found] == ["drop@p=0.5,k=20..100", "error@period=0.5,from=2,to=10"] and all(r["equal"] for r in found)
+
+
+def test_frames_without_a_sample_index_are_not_compared() -> None:
+    model = ROOT / "tests" / "fixtures" / "network" / "network.toml"
+    for spec in ("delay:by=0.2@id=wheels", "drop@p=0.1"):
+        status, out, err = command("campaign", model, "--inject", spec, "--runs", 1)
+        assert status == 2 and out == "" and "no sample index" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["platoon_bank", "openacc"])
+def test_forged_frames_of_all_never_have_the_open_stamp(name: str) -> None:
+    made = designed(name)
+    cases = [c for c in all_cases(made.model, made.tables, codec_for(made), 20, 200) if "stamp=" in c.spec]
+    assert len(cases) == 4 and all(c.kind == SEEN for c in cases)
+    for c in cases:
+        course = Course(made.model.scenario(None), 200, 200, (), SEED, 0)
+        tally = FaultyRun(made, Native(library("f32"), made.tables), codec_for(made), c, course).go()
+        assert tally.counted["stamp"] == tally.injected > 0 and not differences(c, tally)
+
+
+def test_lost_closing_frames_are_counted_past_a_turn_of_the_counter() -> None:
+    made = designed("platoon")
+    case = case_of("silence:lasts=3.05@id=control,k=40..41")  # 30 samples, the counter has 16 values
+    course = Course(made.model.scenario("rest"), 120, 60, (), SEED, 0)
+    tally = FaultyRun(made, Native(library("f32"), made.tables), codec_for(made), case, course).go()
+    assert tally.health["lost"] == tally.told["lost"] == tally.injected > 16 and not differences(case, tally)
+
+
+def test_a_run_is_long_enough_for_the_scenarios_own_fault() -> None:
+    status, out, _ = command("campaign", "platoon", "--inject", "duplicate@p=0.1", "--runs", 2, "--workers", 1, "--json", "-q")
+    result = json.loads(out)
+    assert status == 0 and result["faults"] and result["tampered_until"] > 150
 
 
 @pytest.mark.parametrize(

@@ -54,12 +54,14 @@ BAD = {
     "drop@to=0": "not after its start",
     "drop@k=5..5": "not after its start",
     "drop@k=-1": "START..END",
+    f"drop@k={'9' * 5000}": "START..END",  # Python reads no whole number of more than 4300 digits
     "drop@id=0x20000000": "largest",
     "drop@seed=-1": "at least 0",
     "drop@id=a-b": "neither a message's name nor a number",
     "flood@at=1,period=1": "one of them",
     "flood@at=1,nth=2": "one or the other",
-    "flood@period=0": "above 0",
+    "flood@period=0": "at least 1e-05",
+    "flood@period=1e-300": "at least 1e-05",  # the moments until the first frame would never come to an end
     "drop@when=gap12_m": "comparison",
     "drop@when=gap12_m >": "not an expression",
     "drop@when=exec('x') > 1": "none of number, signal",
@@ -209,6 +211,12 @@ YAML_BAD = {
     "- action: drop\n  trigger: {p: }": ":1: p: expected a value",
     "- action: drop\n  action: delay": ":1: action is given twice",
     "- {": "not YAML",
+    "- &a [*a]": ":1: nested too deep",
+    "directives: &a\n- *a": "nested too deep",
+    "[" * 3000 + "]" * 3000: ":1: nested too deep",
+    "- {[a]: b}": ":1: a key must be a word",
+    "{[a]: b}": ":1: a key must be a word",
+    "- 'drop\0'": "not YAML",
     "- drop: [\n": "not YAML",
 }
 
@@ -230,6 +238,9 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     bad = tmp_path / "bad.dbc"
     bad.write_text("BO_ what")
     with pytest.raises(InputError, match=r"bad\.dbc: not a DBC"):
+        read_codec(bad)
+    bad.write_bytes(b"VERSION \x9d")
+    with pytest.raises(InputError, match=r"bad\.dbc: not text in the encoding of a DBC"):
         read_codec(bad)
 
 

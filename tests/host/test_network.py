@@ -550,6 +550,9 @@ def test_what_cannot_be_taken_is_refused_with_a_cure(key: str, value: Any, messa
 
 
 WRONG_DBC = [
+    ("BO_ 1900 Diagnostics", "BO_ 1900 RadarFront", "no message 'RadarFront' alone: RadarFront, RadarFront are called so"),
+    ("BO_ 1900 Diagnostics", "BO_ 165 Diagnostics", "0xA5, in common with 'Diagnostics'"),
+    ("SG_ RF_Quality", "SG_ GAP12_M", "no signal 'gap12_m' alone"),
     ("SG_ Gap12_m : 21|16@0- (0.001,0)", "SG_ Gap12_m : 21|33@0- (0.001,0)", "33 bits; a signed signal may have 32"),
     ("SG_ RangeRear : 19|18@1+ (0.001,-100)", "SG_ RangeRear : 20|32@1+ (0.001,-100)", "32 bits; an unsigned signal may have 31"),
     ("SG_ RangeRear : 19|18@1+ (0.001,-100)", "SG_ RangeRear : 19|18@1+ (-0.001,100)", "must be positive"),

@@ -836,9 +836,13 @@ static void lost_ticks_are_told_by_the_next_or_by_the_clock(void **state)
                 warm(&kinds[l], WARM + phase, 70U + phase);
                 save(&kept, &r);
                 const uint32_t overdue = r.node.overdue;
+                const uint32_t missed = health(C).lost;
                 lose_ticks(lost, true);
                 assert_count(overdue + lost, r.node.overdue);
                 run(&r, 1U);
+                if (((lost + 1U) % hg_e2e_modulus(r.node.config->message[C].e2e)) != 0U) { /* else it may be the last one once more */
+                    assert_count(missed + lost, health(C).lost);
+                }
                 assert_true(r.verdict.plant == HG_PLANT_NONE || r.verdict.plant == HG_PLANT_PROVISIONAL);
                 heals_and_finds(&r);
                 /* told as an outage */

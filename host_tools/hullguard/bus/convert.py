@@ -99,8 +99,10 @@ def write_signals(path: Path, entries: Sequence[Entry], dbc: Path) -> list[str]:
         else:
             rows.append((e.time_s, values))
     seen = [n for n in names if any(n in values for _, values in rows)]
-    with path.open("w", encoding="utf-8") as file:
-        file.write(",".join(["time_s", *seen]) + "\n")
-        for time_s, values in rows:
-            file.write(",".join([f"{time_s:.6f}", *(f"{values[n]:.12g}" if n in values else "" for n in seen)]) + "\n")
+    lines = [",".join(["time_s", *seen])]
+    lines += [",".join([f"{time_s:.6f}", *(f"{values[n]:.12g}" if n in values else "" for n in seen)]) for time_s, values in rows]
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     return [f"{unknown} of {len(entries)} frames are not decoded: {dbc.name} has no message with their identifier and length"] if unknown else []

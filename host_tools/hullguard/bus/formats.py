@@ -6,6 +6,7 @@ Every format is read into the same entries. What a format has no room for is tol
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,4 +172,7 @@ def write(path: Path, entries: Sequence[Entry]) -> list[str]:
         made.write(path, entries)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    except (struct.error, OverflowError, ValueError) as error:
+        last = max((e.time_s for e in entries), default=0.0)
+        raise InputError(f"{path}: {path.suffix[1:].lower()} cannot hold these frames, whose last is of {last:.0f} s ({error}); write a log or pcapng") from error
     return losses(path, entries)

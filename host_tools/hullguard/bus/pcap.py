@@ -102,6 +102,8 @@ def read(path: Path) -> Iterator[Entry]:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    if not data:
+        raise InputError(f"{path}: an empty file, no capture")
     reader = _pcapng if data[:4] == struct.pack("<I", _SECTION) else _pcap
     try:
         yield from reader(data)

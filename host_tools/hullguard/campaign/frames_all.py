@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hullguard.design.tables import Tables
+from hullguard.design.protection import NO_STAMP
+from hullguard.design.tables import GroupTable, Tables
 from hullguard.inject.actions import ACTIONS
 from hullguard.inject.codec import Codec
 from hullguard.inject.directive import Directive, parse_directive
+from hullguard.inject.shot import STAMP_MODULUS
 from hullguard.model.schema import Model
 
 SEEN, HEAVY, VALID = "seen", "heavy", "valid"
@@ -16,6 +18,7 @@ CLASSES = {
     HEAVY: "more than 3 flipped bits: passes at the residual rate of the checksum",
     VALID: "checksum and counter are in order: nothing but the plant's physics can tell, like a sensor fault",
 }
+TRUE = ("true", "yes", "1")
 VALUES = ("bias", "drift", "gain", "noise", "spike", "freeze")  # change values and renew the checksum
 
 
@@ -31,11 +34,11 @@ class FrameCase:
 def kind_of(d: Directive) -> str:
     """The class of a directive."""
     if d.action == "corrupt":
-        if d.options.get("repair", "false").lower() in ("true", "yes", "1"):
+        if d.options.get("repair", "false").lower() in TRUE:
             return VALID
         return SEEN if "mask" not in d.options and int(d.options.get("bits", "1")) <= 3 else HEAVY
-    if d.action in VALUES or (d.action == "spoof" and d.options.get("valid", "true") == "true" and not {"counter", "stamp", "frame"} & set(d.options)):
-        return VALID
+    if d.action in VALUES or (d.action == "spoof" and d.options.get("valid", "true").lower() in TRUE):
+        return VALID  # a counter or stamp that the forger chose is now and then the right one
     return HEAVY if d.action == "flood" and "data" not in d.options else SEEN
 
 
@@ -61,7 +64,7 @@ def all_cases(model: Model, tables: Tables, codec: Codec, start: int, end: int) 
     each = [f"corrupt:bits={n}{w},p=0.5" for n in (1, 2, 3, 4, 5, 6, 8, 16, 32) for w in both]
     each += [f"length:to={n}@id={group.name},{k},p=0.5" for n in lengths]
     each += [f"counter:by={n}{w},p=0.3" for n in (1, 3, 8, 15) for w in both]
-    each += [f"spoof:message={group.name},stamp={n}{often}" for n in (0, 9)] + [f"spoof:message={group.name},valid=false{often}"]
+    each += [f"spoof:message={group.name},valid=false{often}"]
     each += [f"{a}{w},p=0.5" for a in ("rtr", "fdtwin", "duplicate", "duplicate:times=3,gap=" + f"{1.5 * period:g}") for w in both]
     each += [] if wide else [f"exttwin{w},p=0.5" for w in both]
     each += [f"replay:frames={n},age={a * period:g}{w},p=0.3" for n, a in ((1, 1), (1, 5), (1, 11), (3, 5)) for w in both]
@@ -75,7 +78,16 @@ def all_cases(model: Model, tables: Tables, codec: Codec, start: int, end: int) 
     sizes = {"bias": "size", "drift": "rate", "noise": "size", "spike": "size"}
     each += [f"{a}:signal={signal.name},{o}={step:g}@{k}" for a, o in sizes.items()]
     each += [f"gain:signal={signal.name},factor=1.2@{k}", f"freeze:signal={signal.name}@{k}"]
-    cases = [case_of(spec) for spec in each]
+    cases = [case_of(spec) for spec in each] + _misplaced(group, start, period, window)
     missing = set(ACTIONS) - {c.directive.action for c in cases} - ({"exttwin"} if wide else set())
     assert not missing, f"actions without a case: {missing}"
     return cases
+
+
+def _misplaced(group: GroupTable, start: int, period: float, window: str) -> list[FrameCase]:
+    """Forged frames of other samples than the open one, early and late: one in 16 samples, whose stamp is therefore never the right one."""
+    if group.message.protection.stamp == NO_STAMP:
+        return []
+    stamps = [(start + ahead) % STAMP_MODULUS for ahead in (1, 7, 9, 15)]
+    specs = [f"spoof:message={group.name},stamp={n}@period={STAMP_MODULUS * period:g},{window}" for n in stamps]
+    return [FrameCase(spec, parse_directive(spec), SEEN) for spec in specs]

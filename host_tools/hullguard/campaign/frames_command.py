@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import math
 import os
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -16,12 +18,16 @@ from rich.console import Console
 from rich.table import Table
 
 from hullguard.campaign.frames import Tally
-from hullguard.campaign.frames_all import CLASSES, HEAVY, FrameCase, all_cases, case_of
-from hullguard.campaign.frames_study import CHUNK, FramesJob, codec_for, failures, pooled, rows, study
+from hullguard.campaign.frames_all import CLASSES, HEAVY, SEEN, FrameCase, all_cases, case_of
+from hullguard.campaign.frames_study import CHUNK, FramesJob, codec_for, failures, pooled, residual_rate, rows, study
 from hullguard.commands import emit, make_folder, prepared, progress, say, the_faults
+from hullguard.core.native import Frame
 from hullguard.design.design import Design
+from hullguard.design.protection import NO_STAMP
 from hullguard.errors import ExpectationError, InputError
+from hullguard.inject.codec import Codec
 from hullguard.inject.engine import Injector
+from hullguard.model.schema import Scenario
 
 ALL = "all"
 SAID = {"stamp": "early or late"}
@@ -38,7 +44,7 @@ def run_frames(args: argparse.Namespace) -> int:
             raise InputError(f"--{name.replace('_', '-')} and --inject do not go together: faulty frames are made one by one; use a campaign of its own for each")
     model, made = prepared(args)
     scenario = model.scenario(args.scenario)
-    samples = args.samples or scenario.samples
+    samples = args.samples or _samples(args, scenario)
     end = samples // 2
     faults = the_faults(args, model, scenario.faults, samples)
     if any(f.start >= end for f in faults):
@@ -70,21 +76,49 @@ def run_frames(args: argparse.Namespace) -> int:
     if together["tried"]:
         low, high = together["interval"]
         say(args, f"of {together['tried']} heavily damaged frames {together['passed']} passed the checksum, expected {together['expected']:.1f} ({low} .. {high})")
-    say(args, f"{result['injected']} faulty frames in {result['runs']} runs of {samples} samples, {time.monotonic() - began:.0f} s; frames are tampered with until sample {end}")
+    said = f"{result['injected']} faulty frames in {result['runs']} runs of {samples} samples, {time.monotonic() - began:.0f} s"
+    say(args, f"{said}; frames are tampered with until sample {end} where nothing else is said")
     emit(args, result)
     if failed:
         raise ExpectationError("; ".join(failed[:3]) + (f"; and {len(failed) - 3} more" if len(failed) > 3 else ""))
     return 0
 
 
+def _samples(args: argparse.Namespace, scenario: Scenario) -> int:
+    """Length of a run where none is asked for: the scenario's, or more, so that its own faults begin while frames are tampered with."""
+    own = [] if args.no_fault or args.fault else scenario.faults
+    return max([scenario.samples, *(3 * f.start for f in own)])
+
+
 def _cases(args: argparse.Namespace, made: Design, end: int) -> list[FrameCase]:
     codec = codec_for(made)
     cases: list[FrameCase] = []
     for spec in args.inject:
-        cases += all_cases(made.model, made.tables, codec, end // 5, end) if spec == ALL else [case_of(spec)]
-    for c in cases:
-        Injector([c.directive], codec)  # refuses what cannot be, before the work begins
-    return cases
+        cases += all_cases(made.model, made.tables, codec, end // 5, end) if spec == ALL else [_windowed(case_of(spec), end, made.model.sample_time_s)]
+    return [_judged(c, made, codec) for c in cases]
+
+
+def _windowed(case: FrameCase, end: int, period_s: float) -> FrameCase:
+    """A user's directive, where it names no time of its own, between two samples: what is lost first or last no receiver can count."""
+    t = case.directive.trigger
+    if t.k_start is not None or t.at_s is not None or t.start_s > 0.0 or t.end_s < math.inf:
+        return case
+    window = f"from={end // 5 * period_s:g},to={end * period_s:g}" if t.timed else f"k={end // 5}..{end}"
+    return case_of(case.spec + ("," if "@" in case.spec else "@") + window)
+
+
+def _judged(case: FrameCase, made: Design, codec: Codec) -> FrameCase:
+    """The case in its class on these messages; refuses what cannot be, or cannot be counted, before the work begins."""
+    injector = Injector([case.directive], codec)
+    messages = [(g.name, g.message) for g in made.tables.groups if injector.wants(Frame(g.message.id, g.message.flags, b""))]
+    for name, message in messages:
+        if message.protection.stamp == NO_STAMP:
+            raise InputError(f"{case.spec}: frames of '{name}' carry no sample index, so that nothing says how each must be counted; name other groups with id=")
+    d = case.directive
+    if case.kind != SEEN or d.action != "corrupt":
+        return case
+    bits = int(d.options.get("bits", "1"))
+    return replace(case, kind=HEAVY) if any(residual_rate(m, min(bits, 8 * m.length)) > 0.0 for _, m in messages) else case
 
 
 def _write(out: Path, result: dict[str, Any], cases: Sequence[FrameCase], tallies: Sequence[Tally]) -> None:

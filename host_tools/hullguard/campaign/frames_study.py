@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.campaign.frames import CONTENT, STAMP, Course, FaultyRun, Tally
-from hullguard.campaign.frames_all import HEAVY, SEEN, FrameCase, case_of
+from hullguard.campaign.frames_all import HEAVY, SEEN, FrameCase
 from hullguard.campaign.tasks import each
 from hullguard.codegen.dbc import emit_dbc
 from hullguard.core.library import library
@@ -42,7 +42,7 @@ class FramesJob:
 
 @dataclass(frozen=True)
 class _Item:
-    spec: str
+    case: FrameCase
     first: int
     runs: int
 
@@ -61,17 +61,17 @@ def codec_for(design: Design) -> Codec:
 
 
 def _work(worker: _Worker, item: _Item) -> Tally:
-    job, total, case = worker.job, Tally(), case_of(item.spec)
+    job, total = worker.job, Tally()
     for run in range(item.first, item.first + item.runs):
         faults = job.faults if run % 2 else ()  # every other run is of a healthy plant from end to end
         course = Course(job.scenario, job.samples, job.end, faults, job.seed, run)
-        total.add(FaultyRun(worker.design, worker.native, worker.codec, case, course).go())
+        total.add(FaultyRun(worker.design, worker.native, worker.codec, item.case, course).go())
     return total
 
 
 def study(job: FramesJob, cases: Sequence[FrameCase], runs: int, workers: int, tick: Callable[[int], None]) -> list[Tally]:
     """A tally a case; it does not depend on the number of workers."""
-    items = [_Item(c.spec, first, min(CHUNK, runs - first)) for c in cases for first in range(0, runs, CHUNK)]
+    items = [_Item(c, first, min(CHUNK, runs - first)) for c in cases for first in range(0, runs, CHUNK)]
     done = iter(each(_Worker, _work, job, items, workers, tick))
     tallies = []
     for _ in cases:

@@ -285,3 +285,5 @@ def read_codec(path: Path) -> Codec:
         return codec_of(path.read_text(encoding="cp1252"), path.name)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a DBC file or a model") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not text in the encoding of a DBC, cp1252 ({error.reason} at byte {error.start}); save it so") from error

@@ -19,12 +19,14 @@ from hullguard.inject.options import number
 from hullguard.inject.predicate import Predicate
 
 _TIME = re.compile(r"^time\s*(>=|>|<=|<)\s*(.+)$")
-_SAMPLES = re.compile(r"^(\d+)(\.\.(\d+)?)?$")
+_SAMPLES = re.compile(r"^(\d{1,18})(\.\.(\d{1,18})?)?$")
 _ID = re.compile(r"^(0[xX][0-9A-Fa-f]+|\d+)(?:/(0[xX][0-9A-Fa-f]+|\d+))?(x)?$")
 _SIGN = {">=": "from", ">": "from", "<": "to", "<=": "to"}
 TRIGGERS = ("id", "when", "from", "to", "k", "nth", "every", "at", "period", "p", "count", "name", "seed")
 SEED_MAX = 2**64 - 1
+PERIOD_MIN_S = 1e-5  # more often than any bus has frames; a shorter one would never come to an end
 STANDARD_MAX, EXTENDED_MAX = 0x7FF, 0x1FFFFFFF
+DEPTH_MAX = 6  # levels of a YAML file; directives, entry, options, signals are 4
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,7 @@ def _trigger(given: Mapping[str, str], where: str) -> Trigger:
         nth=of("nth", int, 1) or 0,
         every=of("every", int, 1) or 1,
         at_s=of("at", float, 0.0),
-        period_s=of("period", float, None, None, 0.0),
+        period_s=of("period", float, PERIOD_MIN_S),
         p=1.0 if "p" not in given else of("p", float, 0.0, 1.0),
         count=of("count", int, 1) or 0,
     )
@@ -229,11 +231,15 @@ def read_directives(path: Path) -> list[Directive]:
     try:
         source = path.read_text(encoding="utf-8")
         root = yaml.compose(source, Loader=yaml.SafeLoader)
+        _sane(root, path.name, 0)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a readable YAML file ({error})") from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
-        raise InputError(f"{path.name}:{mark.line + 1 if mark else 1}: not YAML ({getattr(error, 'problem', None) or error})") from error
+        told = " ".join(str(getattr(error, "problem", None) or error).split())
+        raise InputError(f"{path.name}:{mark.line + 1 if mark else 1}: not YAML ({told})") from error
+    except RecursionError as error:
+        raise InputError(f"{path.name}:1: nested too deep; an entry has {DEPTH_MAX} levels at most") from error
     if isinstance(root, yaml.MappingNode):
         entries = {k.value: v for k, v in root.value}
         for extra in entries.keys() - {"directives"}:
@@ -242,6 +248,21 @@ def read_directives(path: Path) -> list[Directive]:
     if not isinstance(root, yaml.SequenceNode) or not root.value:
         raise InputError(f"{path.name}:1: expected a list of directives, for example: directives: [drop@id=0x110]")
     return [_entry(node, f"{path.name}:{node.start_mark.line + 1}") for node in root.value]
+
+
+def _sane(node: yaml.Node | None, name: str, depth: int) -> None:
+    """Refuse keys that are no text, and trees deeper than any directive, also those that hold themselves."""
+    where = f"{name}:{node.start_mark.line + 1 if node else 1}"
+    if depth > DEPTH_MAX:
+        raise InputError(f"{where}: nested too deep; an entry has {DEPTH_MAX} levels at most")
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise InputError(f"{where}: a key must be a word, not a list or a mapping")
+            _sane(value, name, depth + 1)
+    elif isinstance(node, yaml.SequenceNode):
+        for value in node.value:
+            _sane(value, name, depth + 1)
 
 
 def _entry(node: yaml.Node, where: str) -> Directive:

@@ -117,6 +117,10 @@ class Injector:
         for i in range(len(self._stages)):
             self._wake(i)
 
+    def wants(self, frame: Frame) -> bool:
+        """Whether a directive is about frames like this one."""
+        return any(s.wants(frame) and (not s.trigger.timed or s.action.lasting) for s in self._stages)
+
     def _push(self, time_s: float, pending: Pending) -> Pending:
         heapq.heappush(self._queue, (time_s, next(self._order), pending))
         return pending

@@ -93,6 +93,7 @@ class Action:
     expects: ClassVar[tuple[str, ...]] = ()  # each event raises one of these health counters of a receiver by one
     also: ClassVar[tuple[str, ...]] = ()  # what may rise besides, in consequence
     once: ClassVar[bool] = False  # fires once where the trigger does not choose frames
+    lasting: ClassVar[bool] = False  # set off by a moment, it works on frames for a while
 
     def gateway_only(self) -> str:
         """Why a tap cannot do it with these options; empty: it can."""

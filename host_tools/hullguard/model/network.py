@@ -133,6 +133,9 @@ def load(network: Table, folder: Path) -> Any:
 def _nearest(name: str, known: Iterable[str]) -> str:
     """What may have been meant, as the end of a message."""
     names = sorted(known)
+    alike = [n for n in names if n.casefold() == name.casefold()]
+    if len(alike) > 1:
+        return f" alone: {', '.join(alike)} are called so; rename all but one in the database"
     folded = {n.casefold(): n for n in reversed(names)}
     near = difflib.get_close_matches(name.casefold(), list(folded), 1, 0.5)
     return f"; did you mean '{folded[near[0]]}'?" if near else f"; there are {', '.join(names[:12])}{', ..' if len(names) > 12 else ''}" if names else ""
@@ -151,6 +154,9 @@ def _wire(t: Table, database: Any, signals: list[tuple[str, dict[str, Any]]]) ->
     if message is None:
         raise t.error("dbc_message", f"the database has no message '{name}'{_nearest(name, [m.name for m in database.messages])}")
     where = f"{t.where}: message '{message.name}'"
+    twins = [m.name for m in database.messages if m is not message and (m.frame_id, m.is_extended_frame) == (message.frame_id, message.is_extended_frame)]
+    if twins:
+        raise InputError(f"{where} has its identifier, 0x{message.frame_id:X}, in common with '{twins[0]}'; correct the database")
     if message.is_multiplexed():
         raise InputError(f"{where} is multiplexed: what its bits mean changes from frame to frame; ask for the signals in a message of one layout")
     if message.length not in FD_LENGTHS:

@@ -43,6 +43,7 @@ class Silence(Action):
     needs_gateway: ClassVar[str] = "keep a frame from arriving"
     expects: ClassVar[tuple[str, ...]] = LOST
     also: ClassVar[tuple[str, ...]] = GONE
+    lasting: ClassVar[bool] = True
     lasts: float = option(1.0, LASTS, above=0.0)
     until_s: float = field(default=-math.inf, init=False)
 
@@ -89,7 +90,7 @@ class Delay(Action):
     about: ClassVar[str] = "the frame comes later; with jitter, later by chance, and out of order where that is so"
     example: ClassVar[str] = "delay:by=0.15,jitter=0.05@id=measurement,p=0.2"
     needs_gateway: ClassVar[str] = "hold a frame back"
-    expects: ClassVar[tuple[str, ...]] = ("late", "good")
+    expects: ClassVar[tuple[str, ...]] = ("late", "good", "sequence")
     also: ClassVar[tuple[str, ...]] = MOVED
     by: float = option(0.1, "seconds", low=0.0)
     jitter: float = option(0.0, "seconds more at most", low=0.0)
@@ -111,7 +112,7 @@ class Reorder(Action):
     about: ClassVar[str] = "the frame waits until others of the trigger's identifiers have passed it"
     example: ClassVar[str] = "reorder@id=measurement|control,p=0.1"
     needs_gateway: ClassVar[str] = "hold a frame back"
-    expects: ClassVar[tuple[str, ...]] = ("late", "good")
+    expects: ClassVar[tuple[str, ...]] = ("late", "good", "sequence")
     also: ClassVar[tuple[str, ...]] = MOVED
     behind: int = option(1, "how many pass it", low=1)
     patience: float = option(1.0, "seconds that it waits at most", above=0.0)
