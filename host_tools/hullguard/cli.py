@@ -141,7 +141,7 @@ def build_parser() -> argparse.ArgumentParser:
     p = add("monitor", "live view of a bus or a log: signals with radii, residuals, verdicts, senders, load, losses")
     _common(p)
     _scenario(p)
-    p.add_argument("--log", metavar="FILE", help="candump -L log instead of a bus: played at its own speed in the view, at once as lines")
+    p.add_argument("--log", metavar="FILE", help="recording instead of a bus (formats as in detect): played at its own speed in the view, at once as lines")
     p.add_argument("--speed", metavar="X", help="max, or a multiple of the log's own speed")
     p.add_argument("--plain", action="store_true", help="lines of key=value, also where stdout is no terminal; --json: a JSON object a line")
     p.add_argument("--every", type=float, default=1.0, metavar="S", help="seconds between two such lines (default 1); a change has its own line at once")

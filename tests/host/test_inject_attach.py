@@ -452,3 +452,15 @@ def test_a_ledger_in_a_file_keeps_no_rows(tmp_path: Path) -> None:
     assert header == "time_s,k,directive,action,frame,original,sent,expects,detail,seed"
     assert row.startswith("0.500000,,drop1,drop,0,110#") and row.endswith(",,lost,dropped,1")
     assert codec().closing is not None
+
+
+@pytest.mark.parametrize("suffix", ["blf", "pcapng", "asc"])
+def test_recordings_of_every_format_can_be_falsified(suffix: str, healthy: Path, tmp_path: Path, cli: Cli) -> None:
+    """The same frames, whatever the file; the time stamps of some formats are coarser."""
+    assert cli("convert", healthy / "run.log", tmp_path / f"run.{suffix}").status == 0
+    sent = []
+    for log in (healthy / "run.log", tmp_path / f"run.{suffix}"):
+        out = tmp_path / log.suffix[1:]
+        assert cli("inject", "platoon", "--log", log, "--out", out, "--do", "corrupt:bits=3@id=measurement,every=3").status == 0
+        sent.append([e.frame for e in candump.read(out / "injected.log")])
+    assert sent[0] == sent[1] and len(sent[0]) > 100

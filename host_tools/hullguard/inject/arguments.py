@@ -37,7 +37,7 @@ def add_arguments(p: argparse.ArgumentParser, seed: Callable[[str], int]) -> Non
     p.add_argument("--do", action="append", default=[], metavar="SPEC", help="a directive; may be given more than once")
     p.add_argument("--file", action="append", default=[], metavar="FILE", help="directives in YAML; they come before those of --do")
     p.add_argument("--seed", type=seed, default=1, metavar="S", help="seed of every random number (default 1)")
-    p.add_argument("--log", metavar="FILE", help="work on a candump -L log as a gateway would, without any bus; needs --out")
+    p.add_argument("--log", metavar="FILE", help="work on a recording (.log, .pcap, .pcapng, .blf, .mf4, .asc) as a gateway would, without any bus; needs --out")
     p.add_argument("--out", metavar="DIR", help="write injected.log (what was sent), labels.csv (the truth) and inject.json there")
     p.add_argument("--replay", metavar="FILE", help="send an injected.log again, byte for byte at its times, instead of directives")
     p.add_argument("--speed", type=_seconds, default=1.0, metavar="X", help="of --replay, a multiple of real time (default 1)")

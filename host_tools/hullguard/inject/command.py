@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from hullguard.bus import candump
+from hullguard.bus import candump, formats
 from hullguard.bus.link import opened
 from hullguard.commands import bus_options, emit, make_folder, prepared, say, signalled
 from hullguard.errors import InputError
@@ -46,7 +46,7 @@ def run_inject(args: argparse.Namespace) -> int:
     with _files(args) as (ledger, sink):
         injector = Injector(directives, codec, args.seed, gateway, ledger)
         if args.log:
-            for entry in on_log(injector, candump.read(Path(args.log))):
+            for entry in on_log(injector, formats.read(Path(args.log))):
                 sink(entry)
         else:
             _on_bus(args, injector, sides, sink)
@@ -122,7 +122,7 @@ def _replay(args: argparse.Namespace, sides: list[dict[str, Any]]) -> int:
         raise InputError("--replay sends what was recorded: leave --do, --file and --log out")
     if not sides:
         raise InputError("--replay needs a bus: -i INTERFACE -c CHANNEL")
-    entries = list(candump.read(Path(args.replay)))
+    entries = list(formats.read(Path(args.replay)))
     if args.dry_run:
         say(args, f"{len(entries)} frames to be sent")
         return 0

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from hullguard.bus import candump
+from hullguard.bus import candump, formats
 from hullguard.bus.link import opened
 from hullguard.commands import bus_options, make_speed, prepared, signalled
 from hullguard.core.library import library
@@ -88,7 +88,7 @@ def _source(args: argparse.Namespace, monitor: Monitor, plain: bool) -> Iterator
     samples = args.samples or 0
     if args.log:
         speed = make_speed(args.speed or ("max" if plain else "1"))
-        entries = candump.read(Path(args.log))
+        entries = formats.read(Path(args.log))
         yield lambda beat: watch_log(monitor, entries, speed, samples, beat)
         return
     options = bus_options(args)
