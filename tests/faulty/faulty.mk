@@ -1,7 +1,7 @@
 # Faulty frames of every action: in process under AddressSanitizer and UBSan, and on vcan against a node that is a process of its own (UBSan: the
 # shadow memory of AddressSanitizer does not fit into a guest). `make test` makes few of them, `make faulty` 10^6 and 10^5.
 
-FAULTY_RUNS := 300
+FAULTY_RUNS := 130
 FAULTY_OPTIONS := --inject all --samples 300 --scenario manoeuvres --fault controller1:bias:2@120
 FAULTY_LIB := $(BUILD)/faulty/lib
 FAULTY_NODE := $(BUILD)/faulty/detector_node

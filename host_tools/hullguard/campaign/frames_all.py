@@ -71,7 +71,7 @@ def all_cases(model: Model, tables: Tables, codec: Codec, start: int, end: int) 
     each += [f"drop{w},p=0.3" for w in both] + [f"silence:lasts={4 * period:g}{w},p=0.1" for w in both] + [f"busoff:lasts={3 * period:g}{w},p=0.1" for w in both]
     each += [f"delay:by={0.5 * period:g}{w},p=0.3" for w in both] + [f"delay:by={0.2 * period:g},jitter={2 * period:g}{w},p=0.3" for w in both]
     each += [f"reorder{w},p=0.3" for w in both] + [f"reorder:behind=3,patience={5 * period:g}{w},p=0.3" for w in both]
-    each += [f"flood:id=0x000,rate={10 / period:g},lasts={3 * period:g}{often}", f"flood:id=0x{number:X},rate={10 / period:g},lasts={3 * period:g}{often}"]
+    each += [f"flood:id=0x000,rate={40 / period:g},lasts={3 * period:g}{often}", f"flood:id=0x{number:X},rate={40 / period:g},lasts={3 * period:g}{often}"]
     each += [f"error:kind={n}{often}" for n in ("busoff", "passive")]
     each += [f"nan:signal={signal.name},pattern={n}@{k},p=0.5" for n in ("invalid", "range")[: 1 + (codec.signal(signal.name)[1].beyond is not None)]]
     each += [f"corrupt:bits=2,repair=true@id={group.name},{k},p=0.3", f"spoof:message={group.name}{often}"]
