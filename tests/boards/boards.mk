@@ -1,0 +1,17 @@
+# Detector nodes on emulated boards: the same frames to the board, to the Linux node and to one in process, and the same answers. `make test` makes
+# a few hundred samples of each board, `make boards` 10 000 in one boot.
+
+BOARD_NAMES := ctucan
+board_run = $(WITH_VCAN) -n 2 -t $(3) $(PY) tests/boards/boards_inside.py $(1) $(abspath $(BOARDS)/out) $(2)
+BOARDS_BUILT := lib apps $(BUILD)/lib/hullguard_f32.i boards-images $(WITH_VCAN)
+
+.PHONY: boards
+boards: $(BOARDS_BUILT) ## detector nodes on emulated boards (Cortex-R5F, RISC-V): 10 000 samples in one boot with faulty frames; minutes
+	@for b in $(BOARD_NAMES); do PYTHONPATH=host_tools $(call board_run,$$b,10000,1200) || exit 1; done
+
+.PHONY: boards-short
+boards-short: $(BOARDS_BUILT)
+	@for b in $(BOARD_NAMES); do \
+	  PYTHONPATH=host_tools $(call board_run,$$b,300,200) >$(BOARDS)/$$b.log 2>&1 || { cat $(BOARDS)/$$b.log; exit 1; }; \
+	  echo "  ok  detector node on board $$b"; done
+TEST_PARTS += boards-short
