@@ -7,6 +7,7 @@ import os
 import queue
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -31,7 +32,16 @@ def _ctucan(image: Path, channel: str | None) -> list[str]:
     return ["qemu-system-riscv32", "-M", "virt", "-bios", "none", "-m", "16M", "-kernel", str(image), *bus, *host, "-device", card]
 
 
-COMMANDS = {"ctucan": _ctucan}
+def _zynqmp_r5(image: Path, channel: str | None) -> list[str]:
+    bus = ["-object", "can-bus,id=canbus0"]
+    host = ["-object", f"can-host-socketcan,id=host0,if={channel},canbus=canbus0"] if channel else []
+    machine = "xlnx-zcu102,canbus0=canbus0" + ("" if channel else ",canbus1=canbus0")
+    first = f"loader,file={image.parent / 'cpu_on.bin'},addr=0x800000,force-raw=on"
+    loaded = ["-device", f"loader,file={image}", "-device", first, "-device", "loader,addr=0x800000,cpu-num=0"]
+    return ["qemu-system-aarch64", "-M", machine, *bus, *host, "-smp", "5", "-m", "128M", "-nic", "none", "-semihosting", *loaded]
+
+
+COMMANDS = {"ctucan": _ctucan, "zynqmp_r5": _zynqmp_r5}
 
 
 def qemu(board: str, image: str, channel: str | None) -> list[str]:
@@ -100,7 +110,8 @@ class Board:
 def board(name: str, image: str = "detector", channel: str | None = "vcan0") -> Iterator[Board]:
     """An image from its 'ready' to its end, at the latest that of this context."""
     command = qemu(name, image, channel)
-    popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=os.environ | {"QEMU_AUDIO_DRV": "none"})
+    errors = tempfile.TemporaryFile("w+")  # noqa: SIM115: closed with the process
+    popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True, env=os.environ | {"QEMU_AUDIO_DRV": "none"})
     said: queue.Queue[str] = queue.Queue()
 
     def read() -> None:
@@ -111,9 +122,14 @@ def board(name: str, image: str = "detector", channel: str | None = "vcan0") -> 
     threading.Thread(target=read, daemon=True).start()
     made = Board(popen, said)
     try:
-        assert made.line(START_S) == "ready"
+        assert made.line(START_S) == "ready", "the image did not start"
         made.yield_processor()
         yield made
+    except BaseException:
+        errors.seek(0)
+        print(f"{' '.join(command)}\n{errors.read()}", file=sys.stderr)
+        raise
     finally:
         popen.kill()
         popen.wait()
+        errors.close()

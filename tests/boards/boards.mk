@@ -1,7 +1,7 @@
 # Detector nodes on emulated boards: the same frames to the board, to the Linux node and to one in process, and the same answers. `make test` makes
 # a few hundred samples of each board, `make boards` 10 000 in one boot.
 
-BOARD_NAMES := ctucan
+BOARD_NAMES := ctucan zynqmp_r5
 board_run = $(WITH_VCAN) -n 2 -t $(3) $(PY) tests/boards/boards_inside.py $(1) $(abspath $(BOARDS)/out) $(2)
 BOARDS_BUILT := lib apps $(BUILD)/lib/hullguard_f32.i boards-images $(WITH_VCAN)
 
