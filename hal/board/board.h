@@ -20,6 +20,9 @@
  *  @retval HG_E_BUS       the controller is not there, or does not come out of its reset */
 hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t count, hg_hal *hal);
 
+/** What waits call between two looks, of controllers started from now on; null, as at the start: nothing. */
+void hg_board_set_idle(void (*function)(void));
+
 /** Do for a controller what its receive interrupt does: for callers that keep the processor long without a call of its hg_hal. */
 void hg_board_service(uint8_t number);
 

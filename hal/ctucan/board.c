@@ -80,6 +80,12 @@ _Noreturn void hg_board_leave(uint32_t status)
 
 static hg_ctucan controllers[HG_BOARD_CONTROLLERS];
 static hg_queue_slot slots[HG_BOARD_CONTROLLERS][HG_BOARD_DEPTH];
+static void (*idle)(void);
+
+void hg_board_set_idle(void (*function)(void))
+{
+    idle = function;
+}
 
 static bool open_card(void)
 {
@@ -104,7 +110,7 @@ hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t coun
         return HG_E_BUS;
     }
     const hg_ctucan_options options = {
-        .core = WINDOW_CORES + (number * CORE_STRIDE), .timing = TIMING, .timing_fd = TIMING_FD, .now_us = hg_board_now_us,
+        .core = WINDOW_CORES + (number * CORE_STRIDE), .timing = TIMING, .timing_fd = TIMING_FD, .now_us = hg_board_now_us, .idle = idle,
         .filters = filters, .filter_count = count, .slots = slots[number], .depth = HG_BOARD_DEPTH,
     };
     const hg_status status = hg_ctucan_start(&controllers[number], &options);

@@ -154,13 +154,14 @@ static void leave_bus_off(hg_ctucan *self)
 static void look_at_state(hg_ctucan *self)
 {
     const uint32_t events = self->core[INT_STAT] & (INT_STATE_CHANGED | INT_BUS_ERROR);
+    const bool enabled = (self->core[MODE] & MODE_ENABLE) != 0U;
     const bool warning = (self->core[STATUS] & STATUS_WARNING) != 0U;
 
     if (events != 0U) {
         self->core[INT_STAT] = events;
         hg_hal_count(&self->report.errors, 1U);
     }
-    self->report.bus = hg_ctucan_fault(self->core[FAULT] >> FAULT_SHIFT, warning);
+    self->report.bus = hg_ctucan_fault(self->core[FAULT] >> FAULT_SHIFT, enabled, warning);
     if (self->report.bus == HG_BUS_OFF) {
         leave_bus_off(self);
     } else {
@@ -277,6 +278,9 @@ static hg_status wait(void *object, uint64_t until_us)
         }
         if (self->options.now_us() >= until_us) {
             return HG_E_EMPTY;
+        }
+        if (self->options.idle != NULL) {
+            self->options.idle();
         }
     }
 }

@@ -26,6 +26,7 @@ typedef struct {
     uint32_t             timing;        /* register BTR: nominal bit rate */
     uint32_t             timing_fd;     /* register BTR_FD: data bit rate */
     uint64_t           (*now_us)(void); /* monotonic */
+    void               (*idle)(void);   /* called by wait between two looks: sleep until an interrupt, where there is one; null: nothing */
     const hg_hal_filter *filters;       /* null: every frame */
     size_t               filter_count;
     hg_queue_slot       *slots;         /* [depth] */

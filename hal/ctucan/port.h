@@ -3,7 +3,7 @@
  *
  *  | matter | core | QEMU 7.2 |
  *  |---|---|---|
- *  | fault state | one of active, passive, bus-off is set; bus-off until 11 recessive bits were seen after a start | reads 0: never anything but active |
+ *  | fault state | one of active, passive, bus-off is set; bus-off while disabled and until 11 recessive bits were seen | reads 0: active while enabled |
  *  | sending | a buffer is busy until the frame is acknowledged | sent within the write that says so; never busy, never unacknowledged |
  *  | transmit priority 0 | the lowest | never sent: the driver uses 1 .. 7 on both |
  *  | time stamp of a received frame | the platform's time base | 0: the driver stamps what it takes from the core, on both |
@@ -25,10 +25,10 @@
 #define HG_CTUCAN_ERROR_PASSIVE 0x2U
 #define HG_CTUCAN_OFF 0x4U
 
-/** The fault state that its bits tell. */
-static inline hg_bus_state hg_ctucan_fault(uint32_t bits, bool warning)
+/** The fault state that its bits tell, of a core that is enabled or not. */
+static inline hg_bus_state hg_ctucan_fault(uint32_t bits, bool enabled, bool warning)
 {
-    if (((bits & HG_CTUCAN_OFF) != 0U) || ((HG_CTUCAN_QEMU == 0) && (bits == 0U))) {
+    if (((bits & HG_CTUCAN_OFF) != 0U) || ((HG_CTUCAN_QEMU == 0) && (bits == 0U)) || (!enabled)) {
         return HG_BUS_OFF;
     }
     if ((bits & HG_CTUCAN_ERROR_PASSIVE) != 0U) {

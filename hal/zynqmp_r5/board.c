@@ -101,6 +101,12 @@ _Noreturn void hg_board_leave(uint32_t status)
 
 static hg_zynqmp_can controllers[HG_BOARD_CONTROLLERS];
 static hg_queue_slot slots[HG_BOARD_CONTROLLERS][HG_BOARD_DEPTH];
+static void (*idle)(void);
+
+void hg_board_set_idle(void (*function)(void))
+{
+    idle = function;
+}
 
 hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t count, hg_hal *hal)
 {
@@ -108,7 +114,7 @@ hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t coun
         return HG_E_ARGUMENT;
     }
     const hg_zynqmp_can_options options = {
-        .base = CAN + (number * CAN_STRIDE), .prescaler = PRESCALER, .timing = TIMING, .now_us = hg_board_now_us,
+        .base = CAN + (number * CAN_STRIDE), .prescaler = PRESCALER, .timing = TIMING, .now_us = hg_board_now_us, .idle = idle,
         .filters = filters, .filter_count = count, .slots = slots[number], .depth = HG_BOARD_DEPTH,
     };
     const hg_status status = hg_zynqmp_can_start(&controllers[number], &options);

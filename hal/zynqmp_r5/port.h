@@ -5,7 +5,7 @@
  *  |---|---|---|
  *  | identifier register | 11 bits in 31:21, IDE in 19, 18 more bits in 18:1, remote in 20 or 0 | Linux's can_id: identifier in 28:0, extended in 31, remote in 30, error frame in 29 |
  *  | data registers | first byte in 31:24 | first byte in 7:0 |
- *  | error state (SR.ESTAT) | active 1, bus-off 2, passive 3 | 0: never anything but active |
+ *  | error state (SR.ESTAT) | active 1, bus-off 2, passive 3 | 0: active outside the configuration mode |
  *  | sending | queued, sent when the bus allows | sent within the write of the last word; never full, never unacknowledged |
  *  | a software reset | empties the queue of received frames | keeps it: the driver empties it, on both |
  *  | CAN FD frames | an error on the wire | up to 8 bytes are handed on as classic frames, longer ones are not |
@@ -68,10 +68,10 @@ static inline void hg_zynqmp_read_id(uint32_t id, hg_can_frame *frame)
 
 #endif
 
-/** The error state that ESTAT tells. 0 is the configuration mode, which this controller is not in after its start. */
-static inline hg_bus_state hg_zynqmp_state(uint32_t estat, bool warning)
+/** The error state that ESTAT tells, of a controller in its configuration mode or not. */
+static inline hg_bus_state hg_zynqmp_state(uint32_t estat, bool configuring, bool warning)
 {
-    if ((estat == 2U) || ((HG_ZYNQMP_QEMU == 0) && (estat == 0U))) {
+    if ((estat == 2U) || ((HG_ZYNQMP_QEMU == 0) && (estat == 0U)) || configuring) {
         return HG_BUS_OFF;
     }
     if (estat == 3U) {

@@ -110,7 +110,7 @@ static void look_at_state(hg_zynqmp_can *self)
         self->reg[ICR] = events;
         hg_hal_count(&self->report.errors, 1U);
     }
-    self->report.bus = hg_zynqmp_state(SR_ESTAT(status), (status & SR_WARNING) != 0U);
+    self->report.bus = hg_zynqmp_state(SR_ESTAT(status), (status & SR_CONFIG) != 0U, (status & SR_WARNING) != 0U);
     if (self->report.bus == HG_BUS_OFF) {
         leave_bus_off(self);
     } else {
@@ -209,6 +209,9 @@ static hg_status wait(void *object, uint64_t until_us)
         }
         if (self->options.now_us() >= until_us) {
             return HG_E_EMPTY;
+        }
+        if (self->options.idle != NULL) {
+            self->options.idle();
         }
     }
 }

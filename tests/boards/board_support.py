@@ -28,14 +28,14 @@ ANSWER_S = 10.0
 def _ctucan(image: Path, channel: str | None) -> list[str]:
     bus = ["-object", "can-bus,id=canbus0", "-object", "can-bus,id=canbus1"]
     host = ["-object", f"can-host-socketcan,id=host0,if={channel},canbus=canbus0"] if channel else []
-    card = f"ctucan_pci,canbus0=canbus0,canbus1={'canbus1' if channel else 'canbus0'}"
+    card = f"ctucan_pci,canbus0=/objects/canbus0,canbus1=/objects/{'canbus1' if channel else 'canbus0'}"
     return ["qemu-system-riscv32", "-M", "virt", "-bios", "none", "-m", "16M", "-kernel", str(image), *bus, *host, "-device", card]
 
 
 def _zynqmp_r5(image: Path, channel: str | None) -> list[str]:
     bus = ["-object", "can-bus,id=canbus0"]
     host = ["-object", f"can-host-socketcan,id=host0,if={channel},canbus=canbus0"] if channel else []
-    machine = "xlnx-zcu102,canbus0=canbus0" + ("" if channel else ",canbus1=canbus0")
+    machine = "xlnx-zcu102,canbus0=/objects/canbus0" + ("" if channel else ",canbus1=/objects/canbus0")
     first = f"loader,file={image.parent / 'cpu_on.bin'},addr=0x800000,force-raw=on"
     loaded = ["-device", f"loader,file={image}", "-device", first, "-device", "loader,addr=0x800000,cpu-num=0"]
     return ["qemu-system-aarch64", "-M", machine, *bus, *host, "-smp", "5", "-m", "128M", "-nic", "none", "-semihosting", *loaded]

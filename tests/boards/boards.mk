@@ -15,3 +15,17 @@ boards-short: $(BOARDS_BUILT)
 	  PYTHONPATH=host_tools $(call board_run,$$b,300,200) >$(BOARDS)/$$b.log 2>&1 || { cat $(BOARDS)/$$b.log; exit 1; }; \
 	  echo "  ok  detector node on board $$b"; done
 TEST_PARTS += boards-short
+
+# The contract suite of every HAL on the board itself.
+define board_contract
+$(BOARDS)/$(1)/o/tests/%.o: BOARD_MORE := -isystem tests/boards/include -Itests/contract
+$(call board_image,$(1),contract,tests/contract/contract.c tests/boards/check.c tests/boards/contract_main.c tests/boards/contract_$(1).c)
+endef
+$(foreach b,$(BOARD_NAMES),$(eval $(call board_contract,$(b))))
+
+.PHONY: boards-contract
+boards-contract: boards-images
+	@for b in $(BOARD_NAMES); do \
+	  $(PY) tests/boards/contract_run.py $$b >$(BOARDS)/$$b-contract.log 2>&1 || { cat $(BOARDS)/$$b-contract.log; exit 1; }; \
+	  echo "  ok  contract on board $$(tail -n 1 $(BOARDS)/$$b-contract.log)"; done
+TEST_PARTS += boards-contract

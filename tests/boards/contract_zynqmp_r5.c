@@ -1,0 +1,23 @@
+/* Registers of CAN 0. */
+#include "contract_rig.h"
+
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#define SRR 0xFF060000UL
+#define ENABLE 2UL
+
+const char *const contract_name = "zynqmp_r5";
+const bool contract_classic = true;
+
+void contract_full(bool full)
+{
+    (void)full;
+    check_skip("the emulated controller is never full");
+}
+
+void contract_link(bool up)
+{
+    *(volatile uint32_t *)(uintptr_t)SRR = up ? ENABLE : 0U;
+}
