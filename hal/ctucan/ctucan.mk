@@ -7,3 +7,4 @@ BOARD_SCRIPT_ctucan := hal/ctucan/virt.ld
 
 $(eval $(call board_rules,ctucan))
 $(eval $(call board_image,ctucan,detector,firmware/apps/detector_board.c))
+$(eval $(call board_image,ctucan,sensor,firmware/apps/sensor_board.c))

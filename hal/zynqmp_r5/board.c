@@ -86,9 +86,7 @@ _Noreturn void hg_board_leave(uint32_t status)
 {
 #if HG_ZYNQMP_QEMU
     const uint32_t block[2] = {0x20026UL, status}; /* ADP_Stopped_ApplicationExit */
-    register uint32_t call __asm__("r0") = 0x20U;  /* SYS_EXIT_EXTENDED */
-    register const uint32_t *argument __asm__("r1") = block;
-    __asm__ volatile("svc 0x123456" ::"r"(call), "r"(argument) : "memory");
+    __asm__ volatile("mov r0, %0\n mov r1, %1\n svc 0x123456" ::"r"(0x20U), "r"(block) : "r0", "r1", "memory"); /* SYS_EXIT_EXTENDED */
 #else
     (void)status;
 #endif

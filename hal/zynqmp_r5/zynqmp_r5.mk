@@ -7,6 +7,7 @@ BOARD_SCRIPT_zynqmp_r5 := hal/zynqmp_r5/r5.ld
 
 $(eval $(call board_rules,zynqmp_r5))
 $(eval $(call board_image,zynqmp_r5,detector,firmware/apps/detector_board.c))
+$(eval $(call board_image,zynqmp_r5,sensor,firmware/apps/sensor_board.c))
 
 $(BOARDS)/zynqmp_r5/cpu_on.bin: $(BOARDS)/zynqmp_r5/o/hal/zynqmp_r5/qemu/cpu_on.o
 	$(Q)arm-none-eabi-objcopy -O binary -j .text $< $@
