@@ -1,6 +1,7 @@
 #include "ctucan.h"
 
 #include "port.h"
+#include "registers.h"
 
 #include <string.h>
 
@@ -29,13 +30,13 @@ enum {
 #define PRIORITY_MAX 7U
 #define TX_COMMAND_READY 0x2U
 #define TX_COMMAND_ABORT 0x4U
-#define TX_COMMAND_BUFFER(i) (0x100UL << (i))
+#define TX_COMMAND_BUFFER(i) (0x100U << (i))
 
 /* First word of a frame. */
-#define FORM_REMOTE (1UL << 5)
-#define FORM_EXTENDED (1UL << 6)
-#define FORM_FD (1UL << 7)
-#define FORM_BRS (1UL << 9)
+#define FORM_REMOTE (1U << 5)
+#define FORM_EXTENDED (1U << 6)
+#define FORM_FD (1U << 7)
+#define FORM_BRS (1U << 9)
 #define FORM_WORDS(form) (((form) >> 11) & 0x1FU)
 #define HEAD_WORDS 4U                /* form, identifier, two of time stamp */
 #define FRAME_WORDS (HEAD_WORDS + (HG_CAN_DATA_MAX / 4U))
@@ -54,8 +55,9 @@ static uint32_t dlc_of(uint8_t length)
     return dlc;
 }
 
-static void write_frame(volatile uint32_t *buffer, const hg_can_frame *frame)
+static void write_frame(const hg_ctucan *self, uint32_t buffer, const hg_can_frame *frame)
 {
+    const uint32_t first = TX_BUFFER + (buffer * BUFFER_STRIDE);
     const bool extended = (frame->flags & HG_CAN_EXTENDED) != 0U;
     const bool remote = (frame->flags & HG_CAN_REMOTE) != 0U;
     const uint32_t words = remote ? 0U : (((uint32_t)frame->length + 3U) / 4U);
@@ -65,13 +67,13 @@ static void write_frame(volatile uint32_t *buffer, const hg_can_frame *frame)
     form |= extended ? FORM_EXTENDED : 0U;
     form |= ((frame->flags & HG_CAN_FD) != 0U) ? FORM_FD : 0U;
     form |= ((frame->flags & HG_CAN_BRS) != 0U) ? FORM_BRS : 0U;
-    buffer[0] = form;
-    buffer[1] = extended ? frame->id : (frame->id << BASE_SHIFT);
-    buffer[2] = 0U; /* a time that has passed: now */
-    buffer[3] = 0U;
+    hg_register_write(self->core, first, form);
+    hg_register_write(self->core, first + 1, extended ? frame->id : (frame->id << BASE_SHIFT));
+    hg_register_write(self->core, first + 2, 0U); /* a time that has passed: now */
+    hg_register_write(self->core, first + 3, 0U);
     for (uint32_t i = 0U; i < words; i++) {
         const uint8_t *const byte = &frame->data[4U * i];
-        buffer[HEAD_WORDS + i] = (uint32_t)byte[0] | ((uint32_t)byte[1] << 8) | ((uint32_t)byte[2] << 16) | ((uint32_t)byte[3] << 24);
+        hg_register_write(self->core, first + HEAD_WORDS + i, (uint32_t)byte[0] | ((uint32_t)byte[1] << 8) | ((uint32_t)byte[2] << 16) | ((uint32_t)byte[3] << 24));
     }
 }
 
@@ -79,10 +81,10 @@ static void write_frame(volatile uint32_t *buffer, const hg_can_frame *frame)
 static void read_words(const hg_ctucan *self, uint32_t word[FRAME_WORDS])
 {
     (void)memset(word, 0, FRAME_WORDS * sizeof(word[0]));
-    word[0] = self->core[RX_DATA];
+    word[0] = hg_register_read(self->core, RX_DATA);
     const uint32_t more = FORM_WORDS(word[0]);
     for (uint32_t i = 1U; i <= more; i++) {
-        const uint32_t next = self->core[RX_DATA];
+        const uint32_t next = hg_register_read(self->core, RX_DATA);
         if (i < FRAME_WORDS) {
             word[i] = next;
         }
@@ -118,7 +120,7 @@ static void take_frames(hg_ctucan *self)
     uint32_t word[FRAME_WORDS];
     hg_can_frame frame;
 
-    for (uint32_t i = 0U; (i < HG_CTUCAN_BURST) && (RX_FRAMES(self->core[RX_STATUS]) > 0U); i++) {
+    for (uint32_t i = 0U; (i < HG_CTUCAN_BURST) && (RX_FRAMES(hg_register_read(self->core, RX_STATUS)) > 0U); i++) {
         read_words(self, word);
         if (!parse(word, &frame)) {
             hg_hal_count(&self->report.malformed, 1U);
@@ -129,8 +131,8 @@ static void take_frames(hg_ctucan *self)
             /* queued, or not asked for */
         }
     }
-    if ((self->core[STATUS] & STATUS_OVERRUN) != 0U) {
-        self->core[COMMAND] = COMMAND_CLEAR_OVERRUN;
+    if ((hg_register_read(self->core, STATUS) & STATUS_OVERRUN) != 0U) {
+        hg_register_write(self->core, COMMAND, COMMAND_CLEAR_OVERRUN);
         hg_hal_count(&self->report.lost, 1U);
     }
 }
@@ -140,11 +142,11 @@ static void leave_bus_off(hg_ctucan *self)
     const uint64_t now_us = self->options.now_us();
 
     if (!self->waiting) {
-        self->core[TX_COMMAND] = TX_COMMAND_ABORT | TX_COMMAND_BUFFER(0U) | TX_COMMAND_BUFFER(1U) | TX_COMMAND_BUFFER(2U) | TX_COMMAND_BUFFER(3U);
+        hg_register_write(self->core, TX_COMMAND, TX_COMMAND_ABORT | TX_COMMAND_BUFFER(0U) | TX_COMMAND_BUFFER(1U) | TX_COMMAND_BUFFER(2U) | TX_COMMAND_BUFFER(3U));
         self->waiting = true;
         self->restart_us = now_us + HG_CTUCAN_RESTART_US;
     } else if (now_us >= self->restart_us) {
-        self->core[COMMAND] = COMMAND_RESET_ERRORS;
+        hg_register_write(self->core, COMMAND, COMMAND_RESET_ERRORS);
         self->restart_us = now_us + HG_CTUCAN_RESTART_US;
     } else {
         /* not yet */
@@ -153,15 +155,15 @@ static void leave_bus_off(hg_ctucan *self)
 
 static void look_at_state(hg_ctucan *self)
 {
-    const uint32_t events = self->core[INT_STAT] & (INT_STATE_CHANGED | INT_BUS_ERROR);
-    const bool enabled = (self->core[MODE] & MODE_ENABLE) != 0U;
-    const bool warning = (self->core[STATUS] & STATUS_WARNING) != 0U;
+    const uint32_t events = hg_register_read(self->core, INT_STAT) & (INT_STATE_CHANGED | INT_BUS_ERROR);
+    const bool enabled = (hg_register_read(self->core, MODE) & MODE_ENABLE) != 0U;
+    const bool warning = (hg_register_read(self->core, STATUS) & STATUS_WARNING) != 0U;
 
     if (events != 0U) {
-        self->core[INT_STAT] = events;
+        hg_register_write(self->core, INT_STAT, events);
         hg_hal_count(&self->report.errors, 1U);
     }
-    self->report.bus = hg_ctucan_fault(self->core[FAULT] >> FAULT_SHIFT, enabled, warning);
+    self->report.bus = hg_ctucan_fault(hg_register_read(self->core, FAULT) >> FAULT_SHIFT, enabled, warning);
     if (self->report.bus == HG_BUS_OFF) {
         leave_bus_off(self);
     } else {
@@ -198,8 +200,8 @@ static bool is_free(uint32_t state)
 /* Frames leave in the order of send: while one is pending, each new one gets a priority below all that are. A buffer, or BUFFERS. */
 static uint32_t choose_buffer(const hg_ctucan *self, uint32_t *priority)
 {
-    const uint32_t states = self->core[TX_STATUS];
-    const uint32_t priorities = self->core[TX_PRIORITY];
+    const uint32_t states = hg_register_read(self->core, TX_STATUS);
+    const uint32_t priorities = hg_register_read(self->core, TX_PRIORITY);
     uint32_t lowest = PRIORITY_MAX + 1U;
     uint32_t buffer = BUFFERS;
 
@@ -232,9 +234,9 @@ static hg_status try_send(hg_ctucan *self, const hg_can_frame *frame)
     if (buffer == BUFFERS) {
         return HG_E_BUSY;
     }
-    write_frame(&self->core[TX_BUFFER + (buffer * BUFFER_STRIDE)], frame);
-    self->core[TX_PRIORITY] = (self->core[TX_PRIORITY] & ~(0x7UL << (4U * buffer))) | (priority << (4U * buffer));
-    self->core[TX_COMMAND] = TX_COMMAND_READY | TX_COMMAND_BUFFER(buffer);
+    write_frame(self, buffer, frame);
+    hg_register_write(self->core, TX_PRIORITY, (hg_register_read(self->core, TX_PRIORITY) & ~(0x7U << (4U * buffer))) | (priority << (4U * buffer)));
+    hg_register_write(self->core, TX_COMMAND, TX_COMMAND_READY | TX_COMMAND_BUFFER(buffer));
     return HG_OK;
 }
 
@@ -297,15 +299,15 @@ static bool options_good(const hg_ctucan_options *options)
     return good;
 }
 
-static bool reset(volatile uint32_t *core)
+static bool reset(uintptr_t core)
 {
     uint32_t polls = 0U;
 
-    if ((core[DEVICE_ID] & 0xFFFFU) != ID_OF_CORE) {
+    if ((hg_register_read(core, DEVICE_ID) & 0xFFFFU) != ID_OF_CORE) {
         return false;
     }
-    core[MODE] = MODE_RESET;
-    while (((core[MODE] & MODE_RESET) != 0U) && (polls < HG_CTUCAN_RESET_POLLS)) {
+    hg_register_write(core, MODE, MODE_RESET);
+    while (((hg_register_read(core, MODE) & MODE_RESET) != 0U) && (polls < HG_CTUCAN_RESET_POLLS)) {
         polls++;
     }
     return polls < HG_CTUCAN_RESET_POLLS;
@@ -316,7 +318,7 @@ hg_status hg_ctucan_start(hg_ctucan *self, const hg_ctucan_options *options)
     if ((self == NULL) || (options == NULL) || (!options_good(options))) {
         return HG_E_ARGUMENT;
     }
-    *self = (hg_ctucan){.options = *options, .core = (volatile uint32_t *)options->core};
+    *self = (hg_ctucan){.options = *options, .core = options->core};
     const hg_status queue = hg_queue_start(&self->queue, options->slots, options->depth);
     if (queue != HG_OK) {
         return queue;
@@ -324,10 +326,10 @@ hg_status hg_ctucan_start(hg_ctucan *self, const hg_ctucan_options *options)
     if (!reset(self->core)) {
         return HG_E_BUS;
     }
-    self->core[BTR] = options->timing;
-    self->core[BTR_FD] = options->timing_fd;
-    self->core[TX_PRIORITY] = 0U;
-    self->core[MODE] = MODE_FD | MODE_AUTOMATIC | MODE_ENABLE;
+    hg_register_write(self->core, BTR, options->timing);
+    hg_register_write(self->core, BTR_FD, options->timing_fd);
+    hg_register_write(self->core, TX_PRIORITY, 0U);
+    hg_register_write(self->core, MODE, MODE_FD | MODE_AUTOMATIC | MODE_ENABLE);
     look_at_state(self);
     return HG_OK;
 }

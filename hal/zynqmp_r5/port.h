@@ -26,43 +26,43 @@
 
 #define HG_ZYNQMP_PROCESSOR_MHZ 1000U
 #define HG_ZYNQMP_BYTE_SHIFT(i) (8U * ((i) % 4U))
-#define HG_ZYNQMP_ERROR_FRAME 0x20000000UL
+#define HG_ZYNQMP_ERROR_FRAME 0x20000000U
 
 static inline uint32_t hg_zynqmp_id_of(const hg_can_frame *frame)
 {
-    return frame->id | (((frame->flags & HG_CAN_EXTENDED) != 0U) ? 0x80000000UL : 0UL) | (((frame->flags & HG_CAN_REMOTE) != 0U) ? 0x40000000UL : 0UL);
+    return frame->id | (((frame->flags & HG_CAN_EXTENDED) != 0U) ? 0x80000000U : 0U) | (((frame->flags & HG_CAN_REMOTE) != 0U) ? 0x40000000U : 0U);
 }
 
 static inline void hg_zynqmp_read_id(uint32_t id, hg_can_frame *frame)
 {
-    const bool extended = (id & 0x80000000UL) != 0U;
+    const bool extended = (id & 0x80000000U) != 0U;
 
     frame->id = id & (extended ? HG_CAN_ID_EXTENDED : HG_CAN_ID_STANDARD);
-    frame->flags = (uint8_t)((extended ? HG_CAN_EXTENDED : 0U) | (((id & 0x40000000UL) != 0U) ? HG_CAN_REMOTE : 0U));
+    frame->flags = (uint8_t)((extended ? HG_CAN_EXTENDED : 0U) | (((id & 0x40000000U) != 0U) ? HG_CAN_REMOTE : 0U));
 }
 
 #else
 
 #define HG_ZYNQMP_PROCESSOR_MHZ 500U
 #define HG_ZYNQMP_BYTE_SHIFT(i) (24U - (8U * ((i) % 4U)))
-#define HG_ZYNQMP_ERROR_FRAME 0UL
+#define HG_ZYNQMP_ERROR_FRAME 0U
 
 static inline uint32_t hg_zynqmp_id_of(const hg_can_frame *frame)
 {
-    const uint32_t remote = ((frame->flags & HG_CAN_REMOTE) != 0U) ? 1UL : 0UL;
+    const uint32_t remote = ((frame->flags & HG_CAN_REMOTE) != 0U) ? 1U : 0U;
 
     if ((frame->flags & HG_CAN_EXTENDED) == 0U) {
         return (frame->id << 21) | (remote << 20);
     }
-    return ((frame->id >> 18) << 21) | (1UL << 20) | (1UL << 19) | ((frame->id & 0x3FFFFUL) << 1) | remote;
+    return ((frame->id >> 18) << 21) | (1U << 20) | (1U << 19) | ((frame->id & 0x3FFFFU) << 1) | remote;
 }
 
 static inline void hg_zynqmp_read_id(uint32_t id, hg_can_frame *frame)
 {
-    const bool extended = (id & (1UL << 19)) != 0U;
-    const bool remote = (id & (extended ? 1UL : (1UL << 20))) != 0U;
+    const bool extended = (id & (1U << 19)) != 0U;
+    const bool remote = (id & (extended ? 1U : (1U << 20))) != 0U;
 
-    frame->id = extended ? (((id >> 21) << 18) | ((id >> 1) & 0x3FFFFUL)) : (id >> 21);
+    frame->id = extended ? (((id >> 21) << 18) | ((id >> 1) & 0x3FFFFU)) : (id >> 21);
     frame->flags = (uint8_t)((extended ? HG_CAN_EXTENDED : 0U) | (remote ? HG_CAN_REMOTE : 0U));
 }
 

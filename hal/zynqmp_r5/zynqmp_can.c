@@ -1,6 +1,7 @@
 #include "zynqmp_can.h"
 
 #include "port.h"
+#include "registers.h"
 
 /* Registers, in words from the base. */
 enum {
@@ -28,9 +29,9 @@ enum {
 /* All four words must be read: the last one moves the queue on. */
 static void read_frame(const hg_zynqmp_can *self, uint32_t *id, hg_can_frame *frame)
 {
-    *id = self->reg[RX_ID];
-    const uint32_t dlc = self->reg[RX_DLC] >> DLC_SHIFT;
-    const uint32_t data[DATA_WORDS] = {self->reg[RX_DATA], self->reg[RX_DATA + 1]};
+    *id = hg_register_read(self->reg, RX_ID);
+    const uint32_t dlc = hg_register_read(self->reg, RX_DLC) >> DLC_SHIFT;
+    const uint32_t data[DATA_WORDS] = {hg_register_read(self->reg, RX_DATA), hg_register_read(self->reg, RX_DATA + 1)};
     *frame = (hg_can_frame){.length = (uint8_t)((dlc > HG_CAN_CLASSIC_MAX) ? HG_CAN_CLASSIC_MAX : dlc)}; /* ISO 11898-1: DLC 9 .. 15 is 8 bytes */
 
     hg_zynqmp_read_id(*id, frame);
@@ -46,16 +47,16 @@ static void take_frames(hg_zynqmp_can *self)
     uint32_t id;
     hg_can_frame frame;
 
-    for (uint32_t i = 0U; (i < HG_ZYNQMP_CAN_BURST) && ((self->reg[ISR] & ISR_RECEIVED) != 0U); i++) {
+    for (uint32_t i = 0U; (i < HG_ZYNQMP_CAN_BURST) && ((hg_register_read(self->reg, ISR) & ISR_RECEIVED) != 0U); i++) {
         read_frame(self, &id, &frame);
-        self->reg[ICR] = ISR_RECEIVED; /* comes back at once where there is another one */
+        hg_register_write(self->reg, ICR, ISR_RECEIVED); /* comes back at once where there is another one */
         if (((id & HG_ZYNQMP_ERROR_FRAME) == 0U) && hg_hal_filter_passes(self->options.filters, self->options.filter_count, &frame)
             && (hg_queue_put(&self->queue, &frame, self->options.now_us()) != HG_OK)) {
             hg_hal_count(&self->report.lost, 1U);
         }
     }
-    if ((self->reg[ISR] & ISR_OVERFLOW) != 0U) {
-        self->reg[ICR] = ISR_OVERFLOW;
+    if ((hg_register_read(self->reg, ISR) & ISR_OVERFLOW) != 0U) {
+        hg_register_write(self->reg, ICR, ISR_OVERFLOW);
         hg_hal_count(&self->report.lost, 1U);
     }
 }
@@ -64,24 +65,24 @@ static bool set_up(const hg_zynqmp_can *self)
 {
     uint32_t polls = 0U;
 
-    self->reg[SRR] = SRR_RESET;
-    while (((self->reg[SR] & SR_CONFIG) == 0U) && (polls < HG_ZYNQMP_CAN_RESET_POLLS)) {
+    hg_register_write(self->reg, SRR, SRR_RESET);
+    while (((hg_register_read(self->reg, SR) & SR_CONFIG) == 0U) && (polls < HG_ZYNQMP_CAN_RESET_POLLS)) {
         polls++;
     }
     if (polls == HG_ZYNQMP_CAN_RESET_POLLS) {
         return false;
     }
-    self->reg[BRPR] = self->options.prescaler;
-    self->reg[BTR] = self->options.timing;
-    self->reg[AFR] = 0U; /* every frame: there are but four filters in hardware, and they cannot tell all kinds apart */
-    self->reg[MSR] = 0U;
-    for (uint32_t i = 0U; (i < (2U * DEPTH_OF_CONTROLLER)) && ((self->reg[ISR] & ISR_RECEIVED) != 0U); i++) {
+    hg_register_write(self->reg, BRPR, self->options.prescaler);
+    hg_register_write(self->reg, BTR, self->options.timing);
+    hg_register_write(self->reg, AFR, 0U); /* every frame: there are but four filters in hardware, and they cannot tell all kinds apart */
+    hg_register_write(self->reg, MSR, 0U);
+    for (uint32_t i = 0U; (i < (2U * DEPTH_OF_CONTROLLER)) && ((hg_register_read(self->reg, ISR) & ISR_RECEIVED) != 0U); i++) {
         uint32_t id;
         hg_can_frame old;
         read_frame(self, &id, &old);
-        self->reg[ICR] = ISR_RECEIVED;
+        hg_register_write(self->reg, ICR, ISR_RECEIVED);
     }
-    self->reg[SRR] = SRR_ENABLE;
+    hg_register_write(self->reg, SRR, SRR_ENABLE);
     return true;
 }
 
@@ -102,12 +103,12 @@ static void leave_bus_off(hg_zynqmp_can *self)
 
 static void look_at_state(hg_zynqmp_can *self)
 {
-    const uint32_t events = self->reg[ISR] & (ISR_ERROR | ISR_BUS_OFF);
-    const uint32_t status = self->reg[SR];
+    const uint32_t events = hg_register_read(self->reg, ISR) & (ISR_ERROR | ISR_BUS_OFF);
+    const uint32_t status = hg_register_read(self->reg, SR);
 
     if (events != 0U) {
-        self->reg[ESR] = ESR_ALL;
-        self->reg[ICR] = events;
+        hg_register_write(self->reg, ESR, ESR_ALL);
+        hg_register_write(self->reg, ICR, events);
         hg_hal_count(&self->report.errors, 1U);
     }
     self->report.bus = hg_zynqmp_state(SR_ESTAT(status), (status & SR_CONFIG) != 0U, (status & SR_WARNING) != 0U);
@@ -147,10 +148,10 @@ static void write_frame(const hg_zynqmp_can *self, const hg_can_frame *frame)
             data[i / 4U] |= (uint32_t)frame->data[i] << HG_ZYNQMP_BYTE_SHIFT(i);
         }
     }
-    self->reg[TX_ID] = hg_zynqmp_id_of(frame);
-    self->reg[TX_DLC] = (uint32_t)frame->length << DLC_SHIFT;
-    self->reg[TX_DATA] = data[0];
-    self->reg[TX_DATA + 1] = data[1]; /* the last word queues the frame */
+    hg_register_write(self->reg, TX_ID, hg_zynqmp_id_of(frame));
+    hg_register_write(self->reg, TX_DLC, (uint32_t)frame->length << DLC_SHIFT);
+    hg_register_write(self->reg, TX_DATA, data[0]);
+    hg_register_write(self->reg, TX_DATA + 1, data[1]); /* the last word queues the frame */
 }
 
 static hg_status try_send(hg_zynqmp_can *self, const hg_can_frame *frame)
@@ -162,7 +163,7 @@ static hg_status try_send(hg_zynqmp_can *self, const hg_can_frame *frame)
     if (self->report.bus == HG_BUS_OFF) {
         return HG_E_BUS;
     }
-    if ((self->reg[SR] & SR_TX_FULL) != 0U) {
+    if ((hg_register_read(self->reg, SR) & SR_TX_FULL) != 0U) {
         return HG_E_BUSY;
     }
     write_frame(self, frame);
@@ -233,7 +234,7 @@ hg_status hg_zynqmp_can_start(hg_zynqmp_can *self, const hg_zynqmp_can_options *
     if ((self == NULL) || (options == NULL) || (!options_good(options))) {
         return HG_E_ARGUMENT;
     }
-    *self = (hg_zynqmp_can){.options = *options, .reg = (volatile uint32_t *)options->base};
+    *self = (hg_zynqmp_can){.options = *options, .reg = options->base};
     const hg_status queue = hg_queue_start(&self->queue, options->slots, options->depth);
     if (queue != HG_OK) {
         return queue;

@@ -35,7 +35,7 @@ typedef struct {
 
 typedef struct {
     hg_zynqmp_can_options options;
-    volatile uint32_t    *reg;
+    uintptr_t             reg;
     hg_queue              queue;
     hg_hal_report         report;
     uint64_t              restart_us;   /* when to leave bus-off */

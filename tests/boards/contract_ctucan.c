@@ -3,6 +3,8 @@
 
 #include <stdint.h>
 
+#include <cmocka.h>
+
 #define CORE 0x40000000UL
 #define MODE 0x04UL
 #define TX_COMMAND 0x74UL
@@ -33,4 +35,15 @@ void contract_link(bool up)
     const uint32_t mode = *word_at(CORE + MODE);
 
     *word_at(CORE + MODE) = up ? (mode | ENABLE) : (mode & ~ENABLE);
+}
+
+void contract_report(hg_bus_state state)
+{
+    (void)state;
+    check_skip("the emulated controller makes no errors");
+}
+
+int contract_own(void)
+{
+    return 0;
 }

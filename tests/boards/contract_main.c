@@ -106,8 +106,7 @@ static void rig_put_later(rig *self, const hg_can_frame *frame, uint32_t delay_u
 static void rig_report(rig *self, hg_bus_state state)
 {
     (void)self;
-    (void)state;
-    check_skip("the emulated controller makes no errors");
+    contract_report(state);
 }
 
 static void rig_full(rig *self, bool full)
@@ -133,5 +132,6 @@ int main(void)
     static const rig_ops ops = {rig_open, rig_close, rig_put, rig_put_later, rig_report, rig_full, rig_link, rig_stop};
 
     the.base = (rig){.ops = &ops, .classic = contract_classic};
-    return contract_run(contract_name, &the.base);
+    const int failed = contract_run(contract_name, &the.base);
+    return failed + contract_own();
 }
