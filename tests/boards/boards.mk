@@ -46,4 +46,4 @@ $(BUILD)/boards/model/$(1)/$(2)/contract.ok: $(BUILD)/boards/model/$(1)/$(2)/con
 	@$$(call run_test,$$<,$$<)
 boards-contract: $(BUILD)/boards/model/$(1)/$(2)/contract.ok
 endef
-$(foreach t,$(TOOLSETS),$(foreach b,ctucan,$(eval $(call board_model,$(t),$(b)))))
+$(foreach t,$(TOOLSETS),$(foreach b,$(BOARD_NAMES),$(eval $(call board_model,$(t),$(b)))))
