@@ -1,14 +1,19 @@
 /** @file
- *  A detector ECU without operating system: the platoon model's node (hullguard/node.h) on a board's CAN controller (hal/board/board.h), in
- *  lockstep: every closing frame is answered with a verdict, and the clock only bounds how long a frame is offered to a full controller.
+ *  A detector ECU without operating system: the platoon model's node (hullguard/node.h) on a board's CAN controller (hal/board/board.h). It
+ *  begins in lockstep and at rest: every closing frame is answered with a verdict, and the clock only bounds how long a frame is offered to a
+ *  full controller. Timed, a deadline watches the closing frames as in detector_node.c: a sample whose closing frame is overdue is
+ *  closed without it, and an outage is told to the node.
  *
  *  Prints `ready` when it listens. One character on the console asks for more: `h` prints every counter of every group and `end`,
- *  `r` begins anew with empty counters and prints `ready`, `q` ends. */
+ *  `r` begins anew, in lockstep and at rest, with empty counters, and prints `ready`, `t` likewise, but timed and in a moving plant, `q` ends. */
 #include "board.h"
 #include "platoon.h"
 
 #define KEYS_US 5000U      /* how often the console is looked at while the bus is silent */
 #define OFFER_MAX_US 50000U /* longest time one frame is offered to a controller that has no room: the heartbeat says it again */
+#define PERIOD_US HG_PLATOON_SAMPLE_TIME_US
+#define SLACK_US (PERIOD_US / 2U) /* how much later than expected a closing frame may be */
+#define STAMPS_AHEAD 7U    /* samples without a closing frame that the next one's stamp still tells (node.h) */
 #define EXIT_BUS 3U
 #define EXIT_FAILED 1U
 
@@ -17,6 +22,12 @@ typedef struct {
     hg_hal_filter filter[HG_PLATOON_GROUPS];
     uint32_t      steps;
     uint32_t      unsent;  /* frames that found no room or no bus */
+    uint32_t      missed;  /* deadlines */
+    uint32_t      outages; /* told to the node */
+    bool          timed;
+    uint64_t      deadline_us;   /* HG_HAL_FOREVER: in lockstep */
+    uint64_t      closing_us;    /* arrival of the last closing frame */
+    uint32_t      closing_steps; /* `steps` after its own */
 } app;
 
 static hg_platoon_node storage;
@@ -36,21 +47,57 @@ static void make_steps(app *self)
     hg_verdict verdict;
     hg_can_frame frame[2];
     while (hg_node_step(&storage.node, &verdict) == HG_OK) {
-        const uint8_t frames = hg_node_report(&storage.node, &verdict, storage.node.due == 0U, frame);
+        const uint8_t frames = hg_node_report(&storage.node, &verdict, (!self->timed) && (storage.node.due == 0U), frame);
         for (uint8_t i = 0U; i < frames; i++) {
             send_frame(self, &frame[i]);
         }
-        hg_hal_count(&self->steps, 1U);
+        self->steps++;
     }
 }
 
-/* All that has arrived; a bus that never falls silent keeps the console waiting, not the node. */
-static void take_frames(app *self)
+/* By how many samples this node can have fallen behind its sender, by the time of a frame's arrival; none is said without a clock. */
+static void look_at_clock(app *self, uint64_t at_us)
+{
+    if ((!self->timed) || (!storage.node.closed) || (at_us < self->closing_us)) {
+        return;
+    }
+    const uint64_t elapsed = ((at_us - self->closing_us) + (PERIOD_US / 2U)) / PERIOD_US;
+    const uint64_t closed = (uint64_t)(self->steps - self->closing_steps) + 1U;
+    const uint64_t behind = (elapsed > closed) ? (elapsed - closed) : 0U;
+    hg_node_expect(&storage.node, (behind > STAMPS_AHEAD) ? STAMPS_AHEAD : (uint32_t)behind);
+    if (behind > STAMPS_AHEAD) {
+        hg_node_outage(&storage.node);
+        hg_hal_count(&self->outages, 1U);
+    }
+}
+
+static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
+{
+    look_at_clock(self, at_us);
+    (void)hg_node_receive(&storage.node, frame); /* whatever it is: refusals are counted; no steps are due here */
+    const bool closing = storage.node.due > 0U;  /* also one whose numbers could not be used */
+    make_steps(self);
+    if (closing && self->timed) {
+        self->closing_us = at_us;
+        self->closing_steps = self->steps;
+        self->deadline_us = at_us + PERIOD_US + SLACK_US;
+    }
+}
+
+/* What has arrived, a queue full of it at most, and then the deadline: what has come in time is not overtaken by the timer, and a bus that
+ * never falls silent does not stop it. */
+static void work(app *self)
 {
     hg_can_frame frame;
-    while (hg_hal_receive(&self->hal, &frame, NULL) == HG_OK) {
-        (void)hg_node_receive(&storage.node, &frame); /* whatever it is: refusals are counted; no steps are due here */
+    uint64_t at_us;
+    for (uint32_t i = 0U; (i < HG_BOARD_DEPTH) && (hg_hal_receive(&self->hal, &frame, &at_us) == HG_OK); i++) {
+        take_frame(self, &frame, at_us);
+    }
+    if (hg_hal_now_us(&self->hal) >= self->deadline_us) {
+        hg_node_overdue(&storage.node);
         make_steps(self);
+        self->deadline_us += PERIOD_US;
+        hg_hal_count(&self->missed, 1U);
     }
 }
 
@@ -81,6 +128,8 @@ static void say_health(app *self)
     hg_hal_state(&self->hal, &report);
     say_counter("steps", " ", self->steps);
     say_counter("unsent", " ", self->unsent);
+    say_counter("missed", " ", self->missed);
+    say_counter("outages", " ", self->outages);
     say_counter("can.received", " ", report.received);
     say_counter("can.sent", " ", report.sent);
     say_counter("can.lost", " ", report.lost);
@@ -92,21 +141,23 @@ static void say_health(app *self)
 }
 
 /* Only the groups' frames are of interest. */
-static uint32_t begin(app *self)
+static uint32_t begin(app *self, bool timed)
 {
+    *self = (app){.timed = timed, .deadline_us = HG_HAL_FOREVER};
     for (uint8_t i = 0U; i < HG_PLATOON_GROUPS; i++) {
         const hg_message *const message = &hg_platoon_config.message[i];
         self->filter[i] = (hg_hal_filter){.id = message->id, .mask = HG_CAN_ID_EXTENDED, .flags = message->flags & HG_CAN_EXTENDED};
     }
-    self->steps = 0U;
-    self->unsent = 0U;
     if (hg_board_can(0U, self->filter, HG_PLATOON_GROUPS, &self->hal) != HG_OK) {
         hg_board_say("no CAN controller\n");
         return EXIT_BUS;
     }
-    if (hg_platoon_node_start(&storage, HG_START_REST) != HG_OK) {
+    if (hg_platoon_node_start(&storage, timed ? HG_START_MOVING : HG_START_REST) != HG_OK) {
         hg_board_say("model does not start: generate its tables again\n");
         return EXIT_FAILED;
+    }
+    if (timed) { /* a bus that stays silent has to be reported from the start */
+        self->deadline_us = hg_hal_now_us(&self->hal) + PERIOD_US + SLACK_US;
     }
     hg_board_say("ready\n");
     return 0U;
@@ -115,16 +166,17 @@ static uint32_t begin(app *self)
 int main(void)
 {
     static app self;
-    uint32_t status = begin(&self);
+    uint32_t status = begin(&self, false);
     int key = 0;
     while ((status == 0U) && (key != 'q')) {
-        (void)hg_hal_wait(&self.hal, hg_hal_now_us(&self.hal) + KEYS_US);
-        take_frames(&self);
+        const uint64_t keys_us = hg_hal_now_us(&self.hal) + KEYS_US;
+        (void)hg_hal_wait(&self.hal, (self.deadline_us < keys_us) ? self.deadline_us : keys_us);
+        work(&self);
         key = hg_board_key();
         if (key == 'h') {
             say_health(&self);
-        } else if (key == 'r') {
-            status = begin(&self);
+        } else if ((key == 'r') || (key == 't')) {
+            status = begin(&self, key == 't');
         } else {
             /* not for us */
         }
