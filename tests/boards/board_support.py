@@ -14,12 +14,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "node"))
-
 from hullguard.bus.candump import BRS, FD
 from hullguard.core.native import Frame
 
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "node"))  # for those who import this first: what runs inside with-vcan shares inside_support
 IMAGES = ROOT / "build" / "boards"
 START_S = 60.0
 ANSWER_S = 10.0
@@ -62,6 +61,12 @@ class Board:
 
     popen: subprocess.Popen[str]
     lines: queue.Queue[str]
+
+    def read(self) -> None:
+        """Gather what the console says until its end; for a thread of its own."""
+        assert self.popen.stdout is not None
+        for line in self.popen.stdout:
+            self.lines.put(line.strip())
 
     def line(self, timeout_s: float = ANSWER_S) -> str:
         """The next line of the console."""
@@ -110,26 +115,18 @@ class Board:
 def board(name: str, image: str = "detector", channel: str | None = "vcan0") -> Iterator[Board]:
     """An image from its 'ready' to its end, at the latest that of this context."""
     command = qemu(name, image, channel)
-    errors = tempfile.TemporaryFile("w+")  # noqa: SIM115: closed with the process
-    popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True, env=os.environ | {"QEMU_AUDIO_DRV": "none"})
-    said: queue.Queue[str] = queue.Queue()
-
-    def read() -> None:
-        assert popen.stdout is not None
-        for line in popen.stdout:
-            said.put(line.strip())
-
-    threading.Thread(target=read, daemon=True).start()
-    made = Board(popen, said)
-    try:
-        assert made.line(START_S) == "ready", "the image did not start"
-        made.yield_processor()
-        yield made
-    except BaseException:
-        errors.seek(0)
-        print(f"{' '.join(command)}\n{errors.read()}", file=sys.stderr)
-        raise
-    finally:
-        popen.kill()
-        popen.wait()
-        errors.close()
+    with tempfile.TemporaryFile("w+") as errors:
+        popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True, env=os.environ | {"QEMU_AUDIO_DRV": "none"})
+        made = Board(popen, queue.Queue())
+        threading.Thread(target=made.read, daemon=True).start()
+        try:
+            assert made.line(START_S) == "ready", "the image did not start"
+            made.yield_processor()
+            yield made
+        except BaseException:
+            errors.seek(0)
+            print(f"{' '.join(command)}\n{errors.read()}", file=sys.stderr)
+            raise
+        finally:
+            popen.kill()
+            popen.wait()

@@ -86,7 +86,8 @@ def main(sensor_name: str, detector_name: str, out: Path, ticks: int) -> int:
         loop.expect("exit status", (sensor.leave(), detector.leave()), (0, 0))
     if not loop.plants.get("confirmed"):
         loop.differences.append("the sensor fault was not found")
-    result = {"sensor": sensor_name, "detector": detector_name, "ticks": ticks, "frames": loop.sent, "plant": loop.plants, "seconds": round(seconds, 1), "differences": loop.differences}
+    told = {"ticks": ticks, "frames": loop.sent, "plant": loop.plants, "seconds": round(seconds, 1), "differences": loop.differences}
+    result = {"sensor": sensor_name, "detector": detector_name} | told
     (out / f"{sensor_name}-sensor.json").write_text(json.dumps(result, indent=1) + "\n")
     print(json.dumps(result))
     return int(bool(loop.differences))
