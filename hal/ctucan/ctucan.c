@@ -7,7 +7,7 @@
 
 /* Registers, in words from the base; MODE, EWL and TX_COMMAND words hold several of the manual's byte registers. */
 enum {
-    DEVICE_ID = 0x00 / 4, MODE = 0x04 / 4, STATUS = 0x08 / 4, COMMAND = 0x0C / 4, INT_STAT = 0x10 / 4, INT_MASK_SET = 0x1C / 4,
+    DEVICE_ID = 0x00 / 4, MODE = 0x04 / 4, STATUS = 0x08 / 4, COMMAND = 0x0C / 4, INT_STAT = 0x10 / 4,
     BTR = 0x24 / 4, BTR_FD = 0x28 / 4, FAULT = 0x2C / 4, RX_STATUS = 0x68 / 4, RX_DATA = 0x6C / 4, TX_STATUS = 0x70 / 4,
     TX_COMMAND = 0x74 / 4, TX_PRIORITY = 0x78 / 4, TX_BUFFER = 0x100 / 4
 };

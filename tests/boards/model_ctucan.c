@@ -13,7 +13,6 @@ enum { ACTIVE = 1, PASSIVE = 2, OFF = 4 };
 #define STRIDE 64U
 #define WORDS 20U
 #define FIFO 2048U
-#define RESET_LASTS 3U
 #define ENABLE (1U << 22)
 
 typedef struct {
@@ -35,6 +34,8 @@ typedef struct {
     uint32_t left;        /* words of the frame that is being read */
 } core;
 
+static uint32_t device_id = 0x0205CAFDU;
+static uint32_t reset_lasts = 3U;   /* looks at MODE; UINT32_MAX: for ever */
 static core cores[HG_BOARD_CONTROLLERS];
 static hg_ctucan drivers[HG_BOARD_CONTROLLERS];
 
@@ -115,9 +116,9 @@ uint32_t hg_register_read(uintptr_t base, uint32_t number)
 
     switch (number) {
     case DEVICE_ID:
-        return 0x0205CAFDU;
+        return device_id;
     case MODE:
-        self->resetting -= (self->resetting > 0U) ? 1U : 0U;
+        self->resetting -= ((self->resetting > 0U) && (self->resetting < UINT32_MAX)) ? 1U : 0U;
         return self->mode | ((self->resetting > 0U) ? 1U : 0U);
     case STATUS:
         return (self->overrun ? 2U : 0U) | (self->warning ? 0x40U : 0U);
@@ -141,7 +142,7 @@ uint32_t hg_register_read(uintptr_t base, uint32_t number)
 static void set_mode(core *self, uint32_t value)
 {
     if ((value & 1U) != 0U) {
-        *self = (core){.resetting = RESET_LASTS, .fault = OFF, .acknowledged = true, .state = {EMPTY, EMPTY, EMPTY, EMPTY}};
+        *self = (core){.resetting = reset_lasts, .fault = OFF, .acknowledged = true, .state = {EMPTY, EMPTY, EMPTY, EMPTY}};
     } else {
         self->mode = value;
         self->fault = ((value & ENABLE) != 0U) ? ACTIVE : OFF;
@@ -318,10 +319,40 @@ static void a_frame_shorter_than_its_dlc_is_malformed(void **state)
     assert_int_equal(report.malformed, 1);
 }
 
+static void start_refuses_what_cannot_be(void **state)
+{
+    static const hg_hal_filter bad = {.id = 0x800U};
+    hg_ctucan board;
+    const hg_ctucan_options good = {.core = MODEL_BASE(0), .now_us = hg_board_now_us, .slots = model_slots[0], .depth = HG_BOARD_DEPTH};
+    hg_ctucan_options options[6] = {good, good, good, good, good, good};
+
+    (void)state;
+    options[0].core = 0U;
+    options[1].core += 2U;
+    options[2].now_us = NULL;
+    options[3].slots = NULL;
+    options[4].depth = 3U;
+    options[5].filters = &bad;
+    options[5].filter_count = 1U;
+    for (size_t i = 0U; i < 6U; i++) {
+        assert_int_equal(hg_ctucan_start(&board, &options[i]), HG_E_ARGUMENT);
+    }
+    assert_int_equal(hg_ctucan_start(NULL, &good), HG_E_ARGUMENT);
+    assert_int_equal(hg_ctucan_start(&board, NULL), HG_E_ARGUMENT);
+    assert_int_equal(hg_ctucan_start(&board, &good), HG_OK);
+    device_id = 0U;
+    assert_int_equal(hg_ctucan_start(&board, &good), HG_E_BUS);
+    device_id = 0x0205CAFDU;
+    reset_lasts = UINT32_MAX;
+    assert_int_equal(hg_ctucan_start(&board, &good), HG_E_BUS);
+    reset_lasts = 3U;
+}
+
 int contract_own(void)
 {
     static hg_hal hal[2];
     const struct CMUnitTest tests[] = {
+        {"start_refuses_what_cannot_be", start_refuses_what_cannot_be, nothing, nothing, hal},
         {"frames_leave_in_the_order_of_send", frames_leave_in_the_order_of_send, open_both, nothing, hal},
         {"bus_off_heals_after_a_pause", bus_off_heals_after_a_pause, open_both, nothing, hal},
         {"an_overrun_of_the_core_is_counted", an_overrun_of_the_core_is_counted, open_both, nothing, hal},

@@ -32,6 +32,7 @@ typedef struct {
     fifo     rx;
 } controller;
 
+static bool stuck;   /* in operation, whatever is written */
 static controller controllers[HG_BOARD_CONTROLLERS];
 static hg_zynqmp_can drivers[HG_BOARD_CONTROLLERS];
 
@@ -98,7 +99,7 @@ uint32_t hg_register_read(uintptr_t base, uint32_t number)
     case SRR:
         return self->enabled ? 2U : 0U;
     case SR:
-        return (self->enabled ? 8U : 1U) | (self->state << 7) | (self->warning ? 0x40U : 0U) | ((self->tx.held == DEPTH) ? 0x400U : 0U);
+        return ((self->enabled || stuck) ? 8U : 1U) | (self->state << 7) | (self->warning ? 0x40U : 0U) | ((self->tx.held == DEPTH) ? 0x400U : 0U);
     case ISR:
         self->events |= (self->rx.held > 0U) ? RECEIVED : 0U;
         return self->events;
@@ -260,10 +261,37 @@ static void an_overflow_of_the_controller_is_counted(void **state)
     assert_int_equal(report.lost, 1);
 }
 
+static void start_refuses_what_cannot_be(void **state)
+{
+    static const hg_hal_filter bad = {.id = 0x800U};
+    hg_zynqmp_can board;
+    const hg_zynqmp_can_options good = {.base = MODEL_BASE(0), .now_us = hg_board_now_us, .slots = model_slots[0], .depth = HG_BOARD_DEPTH};
+    hg_zynqmp_can_options options[6] = {good, good, good, good, good, good};
+
+    (void)state;
+    options[0].base = 0U;
+    options[1].base += 2U;
+    options[2].now_us = NULL;
+    options[3].slots = NULL;
+    options[4].depth = 3U;
+    options[5].filters = &bad;
+    options[5].filter_count = 1U;
+    for (size_t i = 0U; i < 6U; i++) {
+        assert_int_equal(hg_zynqmp_can_start(&board, &options[i]), HG_E_ARGUMENT);
+    }
+    assert_int_equal(hg_zynqmp_can_start(NULL, &good), HG_E_ARGUMENT);
+    assert_int_equal(hg_zynqmp_can_start(&board, NULL), HG_E_ARGUMENT);
+    assert_int_equal(hg_zynqmp_can_start(&board, &good), HG_OK);
+    stuck = true;
+    assert_int_equal(hg_zynqmp_can_start(&board, &good), HG_E_BUS);
+    stuck = false;
+}
+
 int contract_own(void)
 {
     static hg_hal hal[2];
     const struct CMUnitTest tests[] = {
+        {"start_refuses_what_cannot_be", start_refuses_what_cannot_be, nothing, nothing, hal},
         {"the_registers_have_the_layout_of_silicon", the_registers_have_the_layout_of_silicon, open_both, nothing, hal},
         {"bus_off_heals_after_a_pause", bus_off_heals_after_a_pause, open_both, nothing, hal},
         {"an_overflow_of_the_controller_is_counted", an_overflow_of_the_controller_is_counted, open_both, nothing, hal},
