@@ -27,6 +27,7 @@ from inside_support import Drive, Process, collect, link, node, reachable, ready
 from node_support import SEED
 
 FIRST = 10
+WIDTH_MIN = 3  # samples for each directive
 COUNTERS = ("good", "lost", "crc", "format", "repeated", "early", "late", "sequence", "untrusted", "numeric", "invalid")
 
 
@@ -35,7 +36,9 @@ def directives(ticks: int) -> list[Directive]:
     made, _ = ready()
     codec = codec_for(made)
     count = len(all_cases(made.model, made.tables, codec, 0, 1))
-    width = max(2, (ticks - FIRST - ticks // 20) // count)
+    width = (ticks - FIRST - ticks // 20) // count
+    if width < WIDTH_MIN:
+        sys.exit(f"boards_inside.py: {ticks} ticks are too few for {count} directives; give at least {(WIDTH_MIN * count + FIRST) * 20 // 19 + 20}")
     starts = [FIRST + i * width for i in range(count)]
     return [all_cases(made.model, made.tables, codec, start, start + (width - 1) // 2)[i].directive for i, start in enumerate(starts)]
 
