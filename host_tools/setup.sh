@@ -44,7 +44,7 @@ install_packages() {
 # Where there is no apt, the tools may have come some other way: name what lacks, stop only where nothing would work.
 look_for_tools() {
     local tool absent=() wanted=(gcc linux.uml ip)
-    [ "$level" = demo ] || wanted+=(g++ clang-19 llvm-profdata-19 valgrind candump)
+    [ "$level" = demo ] || wanted+=(g++ clang-19 llvm-profdata-19 valgrind candump qemu-system-riscv32 qemu-system-aarch64 riscv64-unknown-elf-gcc arm-none-eabi-gcc)
     for tool in "${wanted[@]}"; do
         PATH=$PATH:/usr/sbin:/sbin command -v "$tool" >/dev/null || absent+=("$tool")
     done

@@ -31,6 +31,7 @@ typedef struct {
 
 struct rig {
     const rig_ops *ops;
+    bool           classic;   /* its controllers have no CAN FD */
     hg_hal         node;
     hg_hal         peer;
 };

@@ -16,8 +16,8 @@ sh "$here/seeded.sh"
 "$CPPCHECK" --std=c11 --enable=all --check-level=exhaustive --inline-suppr --error-exitcode=1 --quiet -D__linux__ \
   --template='{file}:{line}: {id}: {message}' --suppressions-list="$here/hal.txt" --suppress=missingIncludeSystem \
   --suppress=checkersReport --suppress=unusedFunction --suppress=staticFunction \
-  -Ifirmware/include -Ihal hal/socketcan hal/loopback
-echo "  ok  cppcheck, hal/socketcan hal/loopback"
+  -Ifirmware/include -Ihal -Ihal/board hal/socketcan hal/loopback hal/board hal/ctucan hal/zynqmp_r5
+echo "  ok  cppcheck, hal/"
 
 if [ -d host_tools/hullguard ]; then
     cd host_tools
