@@ -1,7 +1,10 @@
 # make firmware: for every hal/toolchains/NAME.mk the library and a detector image, $(BUILD)/firmware/NAME/{libhullguard.a,detector.elf}.
 # A toolchain file says, each with _NAME behind it: CROSS, the prefix of the compiler's programs; MACHINE, its flags; REAL, the number type; ENDIAN;
-# START, the first instructions; MEMORY, the symbols of hal/start/image.ld; RUN, the emulator that takes a program, empty where none does.
+# LIBC, the C library of test programs: newlib on the bare processor, glibc under Linux, none; START, the first instructions; MEMORY, the symbols of hal/start/image.ld; RUN, the emulator that takes a program, empty where none does.
 # An image is linked with nothing but these objects and libgcc, so that a call of a C library's function does not link.
+
+# For RUN: QEMU's machine has a console and an exit status by semihosting, and takes the program that comes behind.
+SEMIHOSTING := -display none -monitor none -serial null -chardev stdio,id=console -semihosting-config enable=on,target=native,chardev=console -kernel
 
 TOOLCHAINS := $(wildcard hal/toolchains/*.mk)
 TARGETS    := $(sort $(basename $(notdir $(TOOLCHAINS))))

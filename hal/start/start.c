@@ -17,6 +17,12 @@ __attribute__((weak)) _Noreturn void hg_stop(void)
     }
 }
 
+__attribute__((weak)) _Noreturn void hg_end(int status)
+{
+    (void)status;
+    hg_stop();
+}
+
 _Noreturn void hg_start(void)
 {
     const uint32_t *from = hg_data_image;
@@ -27,6 +33,5 @@ _Noreturn void hg_start(void)
     for (uint32_t *to = hg_bss_begin; to != hg_bss_end; to++) {
         *to = 0U;
     }
-    (void)main();
-    hg_stop();
+    hg_end(main());
 }

@@ -4,10 +4,13 @@
 #ifndef HULLGUARD_START_H
 #define HULLGUARD_START_H
 
-/** Fill static memory and call main(); stay here should it return. */
+/** Fill static memory, call main(), and hand what it returns to hg_end(). */
 _Noreturn void hg_start(void);
 
-/** What an exception without a handler does: nothing, for ever. A program may have one of its own. */
+/** What becomes of an exception without a handler: nothing, for ever. A program may define its own. */
 _Noreturn void hg_stop(void);
+
+/** What becomes of a program that has ended: nothing, for ever. A program may define its own. @param[in] status  of main() */
+_Noreturn void hg_end(int status);
 
 #endif
