@@ -40,8 +40,8 @@ target_run     = QEMU_AUDIO_DRV=none timeout --foreground -k 5 900 $(RUN_$(1)) $
 
 .PHONY: target-tests target-quick target-image target-corpus target-unit
 TEST_PARTS += target-quick
-target-tests: target-image target-corpus target-unit ## all targets: contents of the images, the host's bits, unit tests under QEMU
-target-quick: target-image target-corpus $(UNIT_QUICK) ## the part of it that is in `make test`
+target-tests: target-image target-corpus target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
+target-quick: target-image target-corpus $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
 target-image: $(TARGETS:%=$(FIRMWARE)/%/image.ok)
 target-corpus: $(TARGETS:%=$(TARGET_TESTS)/%/corpus.ok)
 target-unit: $(UNIT_TARGETS:%=target-unit-%)
@@ -64,6 +64,12 @@ $(TARGET_TESTS)/$(1)/corpus.ok: $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/host
 	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && diff $(TARGET_TESTS)/host/corpus.log $$<.log && touch $$@ && echo "  ok  $$<" || { echo "FAILED $$<, see $$<.log"; exit 1; }
 endef
 $(foreach t,$(TARGETS),$(eval $(call target_tests,$(t),$(LIBC_$(t)))))
+
+SEEDED := cortex_m4f
+$(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWARE)/$(SEEDED)/image.ok $(TARGET_TESTS)/$(SEEDED)/corpus.ok
+	@COMPILE='$(call cross_cc,$(SEEDED)) $(FREESTANDING) $(WARN) $(INCLUDE)' LINK='$(call cross_cc,$(SEEDED)) $(call image_link,$(SEEDED)) -nostdlib' \
+	    RUN='env QEMU_AUDIO_DRV=none $(RUN_$(SEEDED))' tests/target/seeded $(CROSS_$(SEEDED)) $(ENDIAN_$(SEEDED)) $(FIRMWARE)/$(SEEDED) $(TARGET_TESTS)/$(SEEDED)
+	@touch $@
 
 # The small CMocka counts, and so does the source: a program that ends early, or a test that is not run, is no success.
 # The start-up code is that of the target, also where another board runs it; so is everything else but the places of flash and RAM.
