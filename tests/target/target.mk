@@ -1,6 +1,7 @@
 # make target-tests: what can be shown of every target of hal/firmware.mk without its hardware.
 #   image   tests/target/check_image: what stands in library and image, and what does not
 #   corpus  tests/target/corpus.c: every target that has an emulator computes what the host does, to the bit
+#   node    firmware/apps/detector_main.c on a board with a story: frames lost, a processor that stood still, a fault
 #   unit    tests/unit, unchanged, with the small CMocka of this folder: targets with a C library
 # A test that passed is run again only when it changed; its output is beside it, in .log, and QEMU's in .err.
 
@@ -19,6 +20,7 @@ UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TES
 
 # What a program is made of beside its test: by the C library of its target.
 CORPUS_SRC        := tests/target/corpus.c $(MODEL_SRC)
+NODE_SRC          := firmware/apps/detector_main.c tests/target/board_script.c firmware/models/platoon.c
 CONSOLE_none      := tests/target/console_semihosting.c hal/semihosting/semihosting.c
 CONSOLE_newlib    := $(CONSOLE_none)
 CONSOLE_glibc     := tests/target/console_libc.c
@@ -38,12 +40,13 @@ target_start   = $(if $(filter-out glibc,$(LIBC_$(1))),$(addprefix $(FIRMWARE)/$
 unit_board     = $(if $(filter $(notdir $(2)),$(UNIT_LARGE_$(1))),$(UNIT_BOARD_$(1)),$(1))
 target_run     = QEMU_AUDIO_DRV=none timeout --foreground -k 5 900 $(RUN_$(1)) $(2) </dev/null
 
-.PHONY: target-tests target-quick target-image target-corpus target-unit
+.PHONY: target-tests target-quick target-image target-corpus target-node target-unit
 TEST_PARTS += target-quick
-target-tests: target-image target-corpus target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
-target-quick: target-image target-corpus $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
+target-tests: target-image target-corpus target-node target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
+target-quick: target-image target-corpus target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
 target-image: $(TARGETS:%=$(FIRMWARE)/%/image.ok)
 target-corpus: $(TARGETS:%=$(TARGET_TESTS)/%/corpus.ok)
+target-node: $(TARGETS:%=$(TARGET_TESTS)/%/node.ok)
 target-unit: $(UNIT_TARGETS:%=target-unit-%)
 
 $(FIRMWARE)/%/image.ok: $(FIRMWARE)/%/detector.elf $(FIRMWARE)/%/libhullguard.a tests/target/check_image
@@ -57,11 +60,16 @@ $(TARGET_TESTS)/host/corpus.log: $(TARGET_TESTS)/host/corpus
 
 # $(call target_tests,TARGET,LIBC)
 define target_tests
-$(eval $(call objects,$(TARGET_TESTS)/$(1),$(CORPUS_SRC) $(CONSOLE_$(2)) $(CMOCKA_$(2)) $(if $(CMOCKA_$(2)),$(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
+$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC) $(NODE_SRC)) $(CONSOLE_$(2)) $(CMOCKA_$(2)) $(if $(CMOCKA_$(2)),$(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
 $(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC) $(CONSOLE_$(2))) $(call target_start,$(1)) $(FIRMWARE)/$(1)/libhullguard.a
 	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$^ -lgcc
 $(TARGET_TESTS)/$(1)/corpus.ok: $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/host/corpus.log
 	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && diff $(TARGET_TESTS)/host/corpus.log $$<.log && touch $$@ && echo "  ok  $$<" || { echo "FAILED $$<, see $$<.log"; exit 1; }
+$(TARGET_TESTS)/$(1)/node: $(call target_objects,$(1),$(NODE_SRC) $(CONSOLE_$(2))) $(call target_start,$(1)) $(FIRMWARE)/$(1)/libhullguard.a
+	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$^ -lgcc
+$(TARGET_TESTS)/$(1)/node.ok: $(TARGET_TESTS)/$(1)/node
+	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && grep -q 'tell the story$$$$' $$<.log && touch $$@ && echo "  ok  $$<" || \
+	    { cat $$<.log $$<.err; echo "FAILED $$<"; exit 1; }
 endef
 $(foreach t,$(TARGETS),$(eval $(call target_tests,$(t),$(LIBC_$(t)))))
 
