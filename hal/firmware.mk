@@ -1,6 +1,10 @@
 # make firmware: for every hal/toolchains/NAME.mk the library and a detector image, $(BUILD)/firmware/NAME/{libhullguard.a,detector.elf}.
-# A toolchain file says, each with _NAME behind it: CROSS, the prefix of the compiler's programs; MACHINE, its flags; REAL, the number type; ENDIAN;
-# LIBC, the C library of test programs: newlib on the bare processor, glibc under Linux, none; START, the first instructions; MEMORY, the symbols of hal/start/image.ld; RUN, the emulator that takes a program, empty where none does.
+# A toolchain file says, each with _NAME behind it:
+#   CROSS    prefix of the compiler's programs         MACHINE  its flags
+#   REAL     number type                               ENDIAN   little or big
+#   START    source of the first instructions          MEMORY   symbols of hal/start/image.ld: where flash and RAM are
+#   LIBC     C library that test programs may use: newlib (bare processor), glibc (Linux), none
+#   RUN      emulator that takes a program; empty: none, and nothing but the contents of library and image is tested
 # An image is linked with nothing but these objects and libgcc, so that a call of a C library's function does not link.
 
 # For RUN: QEMU's machine has a console and an exit status by semihosting, and takes the program that comes behind.
@@ -33,6 +37,7 @@ define firmware_target
 $(eval $(call objects,$(FIRMWARE)/$(1),$(LIB_SRC) $(IMAGE_SRC) $(DETECTOR_SRC) $(filter %.c,$(START_$(1))),$$(call cross_cc,$(1)) $$(FREESTANDING)))
 $(eval $(call assembly,$(FIRMWARE)/$(1),$(filter %.S,$(START_$(1))),$$(call cross_cc,$(1))))
 $(eval $(call archive,$(FIRMWARE)/$(1)/libhullguard.a,$(FIRMWARE)/$(1),$(LIB_SRC)))
+$(patsubst %.c,$(FIRMWARE)/$(1)/%.o,$(LIB_SRC) $(IMAGE_SRC) $(DETECTOR_SRC)) $(FIRMWARE)/$(1)/detector.elf: hal/toolchains/$(1).mk hal/firmware.mk
 $(FIRMWARE)/$(1)/libhullguard.a: AR := $(CROSS_$(1))ar
 $(FIRMWARE)/$(1)/hal/start/memory.o: FREESTANDING += -fno-tree-loop-distribute-patterns
 $(FIRMWARE)/$(1)/detector.elf: $(call image_objects,$(1),$(DETECTOR_SRC)) $(FIRMWARE)/$(1)/libhullguard.a hal/start/image.ld

@@ -6,7 +6,8 @@
 # A test that passed is run again only when it changed; its output is beside it, in .log, and QEMU's in .err.
 
 TARGET_TESTS := $(BUILD)/target-tests
-UNIT_TARGETS := $(foreach t,$(TARGETS),$(if $(filter-out none,$(LIBC_$(t))),$(t)))
+RUN_TARGETS  := $(foreach t,$(TARGETS),$(if $(RUN_$(t)),$(t)))
+UNIT_TARGETS := $(foreach t,$(RUN_TARGETS),$(if $(filter-out none,$(LIBC_$(t))),$(t)))
 
 # Unit tests that need more than the 16 KB of RAM of the microbit: what was compiled for Cortex-M0 runs on the board of Cortex-M3, whose
 # instructions contain M0's. No test is left out on any target.
@@ -45,8 +46,8 @@ TEST_PARTS += target-quick
 target-tests: target-image target-corpus target-node target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
 target-quick: target-image target-corpus target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
 target-image: $(TARGETS:%=$(FIRMWARE)/%/image.ok)
-target-corpus: $(TARGETS:%=$(TARGET_TESTS)/%/corpus.ok)
-target-node: $(TARGETS:%=$(TARGET_TESTS)/%/node.ok)
+target-corpus: $(RUN_TARGETS:%=$(TARGET_TESTS)/%/corpus.ok)
+target-node: $(RUN_TARGETS:%=$(TARGET_TESTS)/%/node.ok)
 target-unit: $(UNIT_TARGETS:%=target-unit-%)
 
 $(FIRMWARE)/%/image.ok: $(FIRMWARE)/%/detector.elf $(FIRMWARE)/%/libhullguard.a tests/target/check_image
@@ -61,17 +62,18 @@ $(TARGET_TESTS)/host/corpus.log: $(TARGET_TESTS)/host/corpus
 # $(call target_tests,TARGET,LIBC)
 define target_tests
 $(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC) $(NODE_SRC)) $(CONSOLE_$(2)) $(CMOCKA_$(2)) $(if $(CMOCKA_$(2)),$(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
+$(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%) $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/$(1)/node: hal/start/image.ld
 $(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC) $(CONSOLE_$(2))) $(call target_start,$(1)) $(FIRMWARE)/$(1)/libhullguard.a
-	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$^ -lgcc
+	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$(filter %.o %.a,$$^) -lgcc
 $(TARGET_TESTS)/$(1)/corpus.ok: $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/host/corpus.log
 	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && diff $(TARGET_TESTS)/host/corpus.log $$<.log && touch $$@ && echo "  ok  $$<" || { echo "FAILED $$<, see $$<.log"; exit 1; }
 $(TARGET_TESTS)/$(1)/node: $(call target_objects,$(1),$(NODE_SRC) $(CONSOLE_$(2))) $(call target_start,$(1)) $(FIRMWARE)/$(1)/libhullguard.a
-	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$^ -lgcc
+	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$(filter %.o %.a,$$^) -lgcc
 $(TARGET_TESTS)/$(1)/node.ok: $(TARGET_TESTS)/$(1)/node
 	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && grep -q 'tell the story$$$$' $$<.log && touch $$@ && echo "  ok  $$<" || \
 	    { cat $$<.log $$<.err; echo "FAILED $$<"; exit 1; }
 endef
-$(foreach t,$(TARGETS),$(eval $(call target_tests,$(t),$(LIBC_$(t)))))
+$(foreach t,$(RUN_TARGETS),$(eval $(call target_tests,$(t),$(LIBC_$(t)))))
 
 SEEDED := cortex_m4f
 $(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWARE)/$(SEEDED)/image.ok $(TARGET_TESTS)/$(SEEDED)/corpus.ok
@@ -85,7 +87,7 @@ define target_unit
 .PHONY: target-unit-$(1)
 target-unit-$(1): $(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%.ok)
 $(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%): $(TARGET_TESTS)/$(1)/%: $(TARGET_TESTS)/$(1)/tests/unit/%.o $(call target_objects,$(1),$(CONSOLE_$(2)) $(CMOCKA_$(2))) $(filter-out %/memory.o,$(call target_start,$(1))) $(FIRMWARE)/$(1)/libhullguard.a
-	$$(Q)$$(call cross_cc,$(1)) $$(call UNIT_LINK_$(2),$$(call unit_board,$(1),$$@)) -o $$@ $$^ -lm
+	$$(Q)$$(call cross_cc,$(1)) $$(call UNIT_LINK_$(2),$$(call unit_board,$(1),$$@)) -o $$@ $$(filter %.o %.a,$$^) -lm
 $(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%.ok): %.ok: %
 	@$$(call target_run,$$(call unit_board,$(1),$$<),$$<) >$$<.log 2>$$<.err && \
 	    grep -q "^\[  PASSED  \] $$$$(grep -o 'cmocka_unit_test(' tests/unit/$$(@F:.ok=.c) | wc -l) test" $$<.log && touch $$@ && echo "  ok  $$<" || \
