@@ -1,5 +1,5 @@
 #!/bin/sh
-# All static checks: MISRA over the library, the proof that this gate can fail, cppcheck over the host's HAL, and for the host tools
+# All static checks: MISRA over the library, the proof that this gate can fail, cppcheck over hal/, and for the host tools
 # ruff and mypy. Tools come from .venv; CPPCHECK names another cppcheck.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -16,8 +16,8 @@ sh "$here/seeded.sh"
 "$CPPCHECK" --std=c11 --enable=all --check-level=exhaustive --inline-suppr --error-exitcode=1 --quiet -D__linux__ \
   --template='{file}:{line}: {id}: {message}' --suppressions-list="$here/hal.txt" --suppress=missingIncludeSystem \
   --suppress=checkersReport --suppress=unusedFunction --suppress=staticFunction \
-  -Ifirmware/include -Ihal -Ihal/board hal/socketcan hal/loopback hal/board hal/ctucan hal/zynqmp_r5
-echo "  ok  cppcheck, hal/"
+  -Ifirmware/include -Ihal -Ihal/board hal/socketcan hal/loopback hal/board hal/ctucan hal/zynqmp_r5 hal/blank hal/start hal/cortex_m
+echo "  ok  cppcheck, hal/ but semihosting, whose assembly it cannot read"
 
 if [ -d host_tools/hullguard ]; then
     cd host_tools

@@ -210,7 +210,9 @@ static void a_float_that_is_no_value_is_refused(void **state)
     for (size_t i = 0U; i < COUNT(cases); i++) {
         hg_can_frame frame = {.id = 0x123U, .length = 8U};
         int32_t code = CANARY_CODE;
-        (void)memcpy(&frame.data[2], &cases[i].pattern, 4U);
+        for (uint8_t b = 0U; b < 4U; b++) { /* lowest byte first, whatever the processor's order is */
+            frame.data[2U + b] = (uint8_t)(cases[i].pattern >> (8U * b));
+        }
         assert_status(cases[i].status, hg_frame_unpack(&message, &frame, &code));
         assert_int_equal(cases[i].code, code);
     }
