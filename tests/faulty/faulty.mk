@@ -1,7 +1,7 @@
 # Faulty frames of every action: in process under AddressSanitizer and UBSan, and on vcan against a node that is a process of its own (UBSan: the
 # shadow memory of AddressSanitizer does not fit into a guest). `make test` makes few of them, `make faulty` 10^6 and 10^5.
 
-FAULTY_RUNS := 130
+FAULTY_RUNS := 170
 FAULTY_OPTIONS := --inject all --samples 300 --scenario manoeuvres --fault controller1:bias:2@120
 FAULTY_LIB := $(BUILD)/faulty/lib
 FAULTY_NODE := $(BUILD)/faulty/detector_node
@@ -28,7 +28,7 @@ endef
 faulty_vcan = $(WITH_VCAN) -t 0 $(PY) tests/faulty/vcan_inside.py $(abspath $(FAULTY_NODE)) $(abspath $(BUILD)/faulty) $(1) $(2)
 
 .PHONY: faulty
-faulty: lib $(FAULTY_BUILT) ## 10^6 faulty frames in process, 10^5 on vcan: counters against the ledger, alarms, faults found; a quarter of an hour
+faulty: lib $(FAULTY_BUILT) ## 10^6 faulty frames in process, 10^5 on vcan: counters against the ledger, alarms, faults found
 	$(call faulty_run,$(FAULTY_RUNS))
 	$(call faulty_vcan,100000,500)
 

@@ -68,7 +68,7 @@ def all_cases(model: Model, tables: Tables, codec: Codec, start: int, end: int) 
     each += [f"{a}{w},p=0.5" for a in ("rtr", "fdtwin", "duplicate", "duplicate:times=3,gap=" + f"{1.5 * period:g}") for w in both]
     each += [] if wide else [f"exttwin{w},p=0.5" for w in both]
     each += [f"replay:frames={n},age={a * period:g}{w},p=0.3" for n, a in ((1, 1), (1, 5), (1, 11), (3, 5)) for w in both]
-    each += [f"drop{w},p=0.3" for w in both] + [f"silence:lasts={4 * period:g}{w},p=0.1" for w in both] + [f"busoff:lasts={3 * period:g}{w},p=0.1" for w in both]
+    each += [f"drop{w},p=0.3" for w in both] + [f"silence:lasts={4 * period:g}{w},every=8" for w in both] + [f"busoff:lasts={3 * period:g}{w},every=8" for w in both]
     each += [f"delay:by={0.5 * period:g}{w},p=0.3" for w in both] + [f"delay:by={0.2 * period:g},jitter={2 * period:g}{w},p=0.3" for w in both]
     each += [f"reorder{w},p=0.3" for w in both] + [f"reorder:behind=3,patience={5 * period:g}{w},p=0.3" for w in both]
     each += [f"flood:id=0x000,rate={40 / period:g},lasts={3 * period:g}{often}", f"flood:id=0x{number:X},rate={40 / period:g},lasts={3 * period:g}{often}"]
