@@ -30,7 +30,7 @@ faulty_vcan = $(WITH_VCAN) -t 0 $(PY) tests/faulty/vcan_inside.py $(abspath $(FA
 .PHONY: faulty
 faulty: lib $(FAULTY_BUILT) ## 10^6 faulty frames in process, 10^5 on vcan: counters against the ledger, alarms, faults found
 	$(call faulty_run,$(FAULTY_RUNS))
-	$(call faulty_vcan,100000,500)
+	$(call faulty_vcan,100000,300)
 
 .PHONY: faulty-short
 faulty-short: lib $(FAULTY_BUILT)

@@ -76,7 +76,7 @@ def all_cases(model: Model, tables: Tables, codec: Codec, start: int, end: int) 
     each += [f"nan:signal={signal.name},pattern={n}@{k},p=0.5" for n in ("invalid", "range")[: 1 + (codec.signal(signal.name)[1].beyond is not None)]]
     each += [f"corrupt:bits=2,repair=true@id={group.name},{k},p=0.3", f"spoof:message={group.name}{often}"]
     sizes = {"bias": "size", "drift": "rate", "noise": "size", "spike": "size"}
-    each += [f"{a}:signal={signal.name},{o}={step:g}@{k}" for a, o in sizes.items()]
+    each += [f"{a}:signal={signal.name},{o}={step:g}@{k}" + (",p=0.3" if a == "spike" else "") for a, o in sizes.items()]
     each += [f"gain:signal={signal.name},factor=1.2@{k}", f"freeze:signal={signal.name}@{k}"]
     cases = [case_of(spec) for spec in each] + _misplaced(group, start, period, window)
     missing = set(ACTIONS) - {c.directive.action for c in cases} - ({"exttwin"} if wide else set())
