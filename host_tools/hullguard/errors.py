@@ -4,9 +4,12 @@ from __future__ import annotations
 
 
 class HullguardError(Exception):
-    """Base class; `status` is the command's exit status."""
+    """Base class; `status` is the command's exit status. What a message quotes, a key or a file's name, cannot break its line."""
 
     status = 1
+
+    def __init__(self, message: object) -> None:
+        super().__init__("".join(c if c.isprintable() else repr(c)[1:-1] for c in str(message)))
 
 
 class InputError(HullguardError):
