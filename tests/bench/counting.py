@@ -77,7 +77,7 @@ def sections(linker_map: Path) -> list[Section]:
     text = re.sub(r"^ (\S+)\n\s+(?=0x)", r" \1 ", text, flags=re.MULTILINE)  # a long name stands on a line of its own
     found = (_SECTION.match(line) for line in text.splitlines())
     made = [Section(m[1] or "", int(m[2], 16), int(m[3], 16), m[4]) for m in found if m and int(m[3], 16) > 0]
-    return sorted((s for s in made if not s.name.startswith((".debug", ".comment", ".ARM.attributes", ".riscv.attributes"))), key=lambda s: s.begin)
+    return sorted((s for s in made if not s.name.startswith((".debug", ".comment", ".note")) and not s.name.endswith(".attributes")), key=lambda s: s.begin)
 
 
 def functions(elf: Path, cross: str) -> list[Function]:

@@ -1,4 +1,5 @@
-"""record.py MODEL FILE: readings of a model's emulated plant as a C header for tests/bench/drive.c, in codes of the wire.
+"""record.py MODEL FILE: readings of a model's emulated plant as a C header for tests/bench/drive.c, in codes of the wire, and the counts that
+tests/bench/size_detector.c needs.
 
 The plant of the model's first scenario runs without a fault until FAULT_AT; from there on with the scenario's own. Seeded: the same file every time.
 """
@@ -22,7 +23,7 @@ FAULT_AT = 440
 SEED = 1
 LINE = 12  # numbers a line
 
-HEADER = """/* Readings of model {name}, by tests/bench/record.py; do not edit. */
+HEADER = """/* Readings of model {name}, and how much its detector holds, by tests/bench/record.py; do not edit. */
 #ifndef HULLGUARD_BENCH_RECORD_H
 #define HULLGUARD_BENCH_RECORD_H
 
@@ -32,6 +33,13 @@ HEADER = """/* Readings of model {name}, by tests/bench/record.py; do not edit. 
 #define RECORD_SAMPLES {samples}U
 #define RECORD_FAULT_AT {fault_at}U
 #define RECORD_SIGNALS {signals}U
+#define RECORD_WIDTH {width}U /* signals of the first group */
+#define RECORD_GENERATORS {generators}U
+#define RECORD_ZONOTOPES {zonotopes}U
+#define RECORD_BANKS {banks}U
+#define RECORD_PREDICTORS {predictors}U
+#define RECORD_REALS {reals}U
+#define RECORD_SUMS {sums}U
 #define record_config hg_{name}_config
 #define record_sender hg_{name}_sender
 #define record_node_start hg_{name}_node_start
@@ -66,7 +74,20 @@ def record(name: str) -> str:
         codes += [code_of(s, reading) for s, reading in zip(signals, plant.read(), strict=True)]
         plant.move()
     lines = [", ".join(str(c) for c in codes[i : i + LINE]) + "," for i in range(0, len(codes), LINE)]
-    return HEADER.format(name=made.model.name, samples=SAMPLES, fault_at=FAULT_AT, signals=len(signals), codes="\n".join(lines))
+    detector = native.node.detector
+    counts = {
+        "samples": SAMPLES,
+        "fault_at": FAULT_AT,
+        "signals": len(signals),
+        "width": len(made.tables.groups[0].signals),
+        "generators": detector.generators,
+        "zonotopes": sum(g.zonotope is not None for g in made.tables.generators),
+        "banks": detector.banks,
+        "predictors": detector.predictors,
+        "reals": detector.reals,
+        "sums": detector.sums,
+    }
+    return HEADER.format(name=made.model.name, codes="\n".join(lines), **counts)
 
 
 if __name__ == "__main__":
