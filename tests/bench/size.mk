@@ -25,7 +25,7 @@ OBJECTS += $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o
 $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o: tests/bench/size_$(4).c $(BENCH)/$(3)_record.h Makefile
 	@mkdir -p $$(@D)
 	$$(Q)$$(call bench_cc,$(1),$(2)) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
-$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(addprefix $(BENCH)/$(1)-$(2)/,$(3)/size_$(4).o $(addsuffix .o,$(basename $(LIB_SRC) $(if $(filter detector,$(4)),,firmware/models/$(3).c) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c))) hal/start/image.ld
+$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(call bench_objects,$(1)-$(2),$(3)/size_$(4).o $(LIB_SRC) $(if $(filter detector,$(4)),,$(3)/tables.o) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c) hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -Wl,-Map=$$(@:.elf=.map) -nostdlib -o $$@ $$(filter %.o,$$^) -lgcc
 endef
 
