@@ -42,7 +42,7 @@ $(BENCH)/count.so: tests/bench/count.c Makefile
 
 $(VARIANTS:%=$(BENCH)/tables/%.ok): $(BENCH)/tables/%.ok: | lib
 	@mkdir -p $(@D)
-	$(Q)$(PY) -m hullguard design $(SOURCE_$*) $(foreach w,$(SET_$*),--set '$(w)') --quiet --out $(BENCH)/tables/$*
+	$(Q)PYTHONPATH=host_tools $(PY) -m hullguard design $(SOURCE_$*) $(foreach w,$(SET_$*),--set '$(w)') --quiet --out $(BENCH)/tables/$*
 	@touch $@
 $(foreach v,$(VARIANTS),$(eval $(call bench_tables,$(v)): $(BENCH)/tables/$(v).ok;))
 $(foreach v,$(VARIANTS),$(eval $(BENCH)/tables/$(v).ok: firmware/models/$(SOURCE_$(v)).c))

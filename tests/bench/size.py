@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from counting import Section, sections
+from counting import Section, rows, sections
 from stack import StackError, compiled, deepest, run_time
 
 COLUMNS = ("code", "tables", "ram", "stack")
@@ -136,12 +136,8 @@ def versions(crosses: Mapping[str, str]) -> dict[str, str]:
 
 def table(sizes: Sequence[Size], markdown: bool) -> list[str]:
     """A row a program."""
-    head = ("target", "model", "part", "code", "tables", "RAM", "stack")
-    rows = [(s.target, s.model, s.part, *(str(n) for n in s.numbers.values())) for s in sizes]
-    if markdown:
-        return ["| " + " | ".join(r) + " |" for r in (head, ("---", "---", "---", "--:", "--:", "--:", "--:"), *rows)]
-    widths = [max(len(r[i]) for r in (head, *rows)) for i in range(len(head))]
-    return ["  ".join(w.ljust(n) if i < 3 else w.rjust(n) for i, (w, n) in enumerate(zip(r, widths, strict=True))) for r in (head, *rows)]
+    body = [(s.target, s.model, s.part, *(str(n) for n in s.numbers.values())) for s in sizes]
+    return rows(("target", "model", "part", "code", "tables", "RAM", "stack"), body, 3, markdown)
 
 
 def main() -> int:
