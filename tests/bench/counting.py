@@ -8,7 +8,7 @@ import shlex
 import subprocess
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,19 +49,14 @@ class Function:
     end: int
     section: Section
 
-    @property
-    def own(self) -> bool:
-        """Whether it is the library's."""
-        return LIBRARY in self.section.source
-
 
 @dataclass
 class Call:
-    """One call of one of the library's functions."""
+    """One call of a function that is counted."""
 
     function: Function
     all: int  # instructions, those of callees too
-    self: int  # without those of callees of the library
+    self: int  # without those of counted callees
     calls: list[Call] = field(default_factory=list)
 
     def walk(self) -> Iterator[Call]:
@@ -97,11 +92,16 @@ def functions(elf: Path, cross: str) -> list[Function]:
     return [found[b] for b in sorted(found)]
 
 
-def count(elf: Path, cross: str, emulator: str, plugin: Path) -> tuple[str, list[Call]]:
-    """Run a program to its end; what it printed, and the outermost calls of the library's functions."""
+def of_library(function: Function) -> bool:
+    """Whether a function is the library's."""
+    return LIBRARY in function.section.source
+
+
+def count(elf: Path, cross: str, emulator: str, plugin: Path, counted: Callable[[Function], bool] = of_library) -> tuple[str, list[Call]]:
+    """Run a program to its end; what it printed, and the outermost calls of the functions that are counted, the library's."""
     listed = functions(elf, cross)
     names, calls = elf.with_suffix(".functions"), elf.with_suffix(".calls")
-    names.write_text("".join(f"{f.begin:x} {f.end:x} {int(f.own)}\n" for f in listed), encoding="utf-8")
+    names.write_text("".join(f"{f.begin:x} {f.end:x} {int(counted(f))}\n" for f in listed), encoding="utf-8")
     calls.unlink(missing_ok=True)
     machine = shlex.split(emulator)
     command = [machine[0], "-plugin", f"{plugin.resolve()},functions={names},calls={calls}", *machine[1:], str(elf)]

@@ -44,6 +44,14 @@ HEADER = """/* Readings of model {name}, and how much its detector holds, by tes
 #define RECORD_PREDICTORS {predictors}U
 #define RECORD_REALS {reals}U
 #define RECORD_SUMS {sums}U
+/* Of its first generator: shapes of a matrix with as many multiply-accumulates as threshold and residuals have. */
+#define RECORD_HULL_ROWS {hull_rows}
+#define RECORD_HULL_COLUMNS {hull_columns}
+#define RECORD_HULL_WIDTH {hull_width}
+#define RECORD_RESIDUAL_ROWS {residual_rows}
+#define RECORD_RESIDUAL_COLUMNS {residual_columns}
+#define RECORD_STATES {states}
+#define RECORD_MEASUREMENTS {measurements}
 #define record_config hg_{name}_config
 #define record_sender hg_{name}_sender
 #define record_node_start hg_{name}_node_start
@@ -89,6 +97,16 @@ def record(made: Design, title: str) -> str:
         "predictors": detector.predictors,
         "reals": detector.reals,
         "sums": detector.sums,
+    }
+    g = made.tables.generators[0]
+    counts |= {
+        "hull_rows": len(g.output),
+        "hull_columns": needs(made.tables)["hull"].macs // len(g.output) if g.zonotope is None else 0,
+        "hull_width": len(g.wide),
+        "residual_rows": len(g.state) + len(g.output),
+        "residual_columns": len(g.state) + len(g.signal),
+        "states": len(g.state),
+        "measurements": sum(i in made.model.outputs for i in g.signal),
     }
     return HEADER.format(name=made.model.name, title=title, codes="\n".join(lines), **counts)
 
