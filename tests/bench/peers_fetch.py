@@ -1,12 +1,13 @@
 """peers_fetch.py FOLDER DBC: C sources of other libraries, from where package registries have them, into FOLDER. Exit status 3: they cannot be had.
 
-    cmsis/    CMSIS-DSP, as its Python package brings it
-    ikalman/  a Kalman filter, with float for double: compared on processors that have no more
-    frame/    pack and unpack of the DBC's messages, by cantools, and CRC-8 with polynomial 0x2F, by pycrc
+cmsis/    CMSIS-DSP, as its Python package brings it
+ikalman/  a Kalman filter, with float for double: compared on processors that have no more
+frame/    pack and unpack of the DBC's messages, by cantools, and CRC-8 with polynomial 0x2F, by pycrc
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
@@ -15,12 +16,37 @@ import tarfile
 from pathlib import Path
 
 LIST = Path(__file__).with_name("peers.txt")
-CRC = "--width 8 --poly 0x2f --reflect-in False --xor-in 0xff --reflect-out False --xor-out 0xff --algorithm table-driven --symbol-prefix crc8_".split()
+CRC = [
+    "--width",
+    "8",
+    "--poly",
+    "0x2f",
+    "--reflect-in",
+    "False",
+    "--xor-in",
+    "0xff",
+    "--reflect-out",
+    "False",
+    "--xor-out",
+    "0xff",
+    "--algorithm",
+    "table-driven",
+    "--symbol-prefix",
+    "crc8_",
+]
 TIMEOUT_S = 240.0
+
+
+def there(folder: Path) -> bool:
+    """Whether all has been fetched before."""
+    wanted = set(re.findall(r"sha256:(\w+)", LIST.read_text(encoding="utf-8")))
+    return wanted <= {hashlib.sha256(file.read_bytes()).hexdigest() for file in folder.iterdir() if file.is_file()}
 
 
 def fetched(folder: Path) -> bool:
     """Ask the registry, and say when it does not answer."""
+    if there(folder):
+        return True
     command = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--no-binary", "cmsisdsp,ikalman", "--require-hashes", "-r", str(LIST), "-d", str(folder)]
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
@@ -45,7 +71,11 @@ def generate(folder: Path, dbc: Path) -> None:
     """The frame codec and the checksum."""
     out = folder / "frame"
     out.mkdir(exist_ok=True)
-    subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--no-floating-point-numbers", "-o", str(out), "--database-name", "peer", str(dbc)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", "cantools", "generate_c_source", "--no-floating-point-numbers", "-o", str(out), "--database-name", "peer", str(dbc)],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     (wheel,) = folder.glob("pycrc-*.whl")
     for kind in "ch":
         command = [sys.executable, "-m", "pycrc", *CRC, "--generate", kind, "-o", str(out / f"crc8.{kind}")]
