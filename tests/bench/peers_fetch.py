@@ -16,24 +16,8 @@ import tarfile
 from pathlib import Path
 
 LIST = Path(__file__).with_name("peers.txt")
-CRC = [
-    "--width",
-    "8",
-    "--poly",
-    "0x2f",
-    "--reflect-in",
-    "False",
-    "--xor-in",
-    "0xff",
-    "--reflect-out",
-    "False",
-    "--xor-out",
-    "0xff",
-    "--algorithm",
-    "table-driven",
-    "--symbol-prefix",
-    "crc8_",
-]
+CRC = ["--width", "8", "--poly", "0x2f", "--reflect-in", "False", "--xor-in", "0xff", "--reflect-out", "False", "--xor-out", "0xff"]
+CRC += ["--algorithm", "table-driven", "--symbol-prefix", "crc8_"]
 TIMEOUT_S = 240.0
 
 
