@@ -356,13 +356,14 @@ def _groups(tables: Tables, names: Names) -> list[str]:
     return [*lines, "};", ""]
 
 
-def _taps(g: GeneratorTable, n: str) -> list[str]:
-    shape = f"{n}_weight [{g.taps}][{len(g.output)}][{len(g.wide)}]"
-    lines = [*comment(f"{shape}: magnitude of the impulse response, residual units a signal unit, by lag, residual and signal")]
-    lines.append(f"static const hg_real {n}_weight[] = {{")
-    for lag, rows in enumerate(g.weight):
-        lines.append(f"    /* lag {lag} */")
-        lines += [line for row in rows for line in fill(reals(row))]
+def _taps(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
+    lines = table("uint8_t", f"{n}_taps", f"{len(g.taps)}", [unsigned(g.taps)], "lags that are summed one by one, by signal")
+    about = "magnitude of the impulse response, residual units a signal unit, by two residuals, signal and lag"
+    lines += [*comment(f"{n}_weight [{sum(g.taps) * len(g.output)}]: {about}"), f"static const hg_real {n}_weight[] = {{"]
+    for first, signal, block in g.blocks:
+        whose = f"residuals {first + 1} and {first + 2}" if len(block[0]) > 1 else f"residual {first + 1}"
+        lines.append(f"    /* {whose}, {signals[g.wide[signal]]} */")
+        lines += fill([x for row in block for x in reals(row)])
     return [*lines, "};", ""]
 
 
@@ -377,17 +378,19 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
         lines += table("hg_real", f"{n}_{part}", f"{order}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
     for part, cols, about in (("output", order, "residual from state"), ("direct", width, "residual from signals")):
         lines += table("hg_real", f"{n}_{part}", f"{residuals}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
-    return lines + (_hull(g, n) if g.zonotope is None else _zonotope(g.zonotope, n, signals))
+    return lines + (_hull(g, n, signals) if g.zonotope is None else _zonotope(g.zonotope, n, signals))
 
 
-def _hull(g: GeneratorTable, n: str) -> list[str]:
+def _hull(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     residuals = len(g.output)
-    lines = _taps(g, n)
+    lines = _taps(g, n, signals)
     for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
         rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {start}"
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
-    lines += table("hg_real", f"{n}_tail_input", f"{len(g.wide)}", [reals(g.tail_input)], "weight of a radius older than the taps")
-    return lines + table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")
+        lines += table("hg_real", f"{n}_{part}_left", f"{residuals}", [reals(getattr(g, f"{part}_left"))], "what is left of the initial state then")
+    lines += table("hg_real", f"{n}_bias", f"{residuals}", [reals(g.bias)], "threshold's part from disturbance and rounding from then on")
+    lines += table("hg_real", f"{n}_decay", f"{residuals}", [reals(g.decay)], "by how much the part behind the taps shrinks in a sample")
+    return lines + table("hg_real", f"{n}_tail", f"{residuals}][{len(g.wide)}", [reals(r) for r in g.tail], "weight of a radius that leaves the taps, residual units a signal unit")
 
 
 REDUCTIONS = {TRUNCATE: "HG_REDUCTION_TRUNCATE", BOX: "HG_REDUCTION_BOX", BALL: "HG_REDUCTION_BALL"}
@@ -527,9 +530,10 @@ def _generators(tables: Tables) -> list[str]:
     for i, g in enumerate(tables.generators):
         n = f"generator{i + 1}"
         lines += [
-            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'}, .taps = {g.taps}U, .weight = {n}_weight,",
-            f"     .settle = {g.settle}U, .rest = {n}_rest, .moving = {n}_moving, .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U,",
-            f"     .decay = {real(g.decay)}, .tail_input = {n}_tail_input, .tail_output = {n}_tail_output}},",
+            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .exponent = 0, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'},",
+            f"     .taps = {n}_taps, .weight = {n}_weight, .settle = {g.settle}U, .rest = {n}_rest, .rest_left = {n}_rest_left,",
+            f"     .moving = {n}_moving, .moving_left = {n}_moving_left, .bias = {n}_bias,",
+            f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay, .tail = {n}_tail}},",
         ]
     return [*lines, "};", ""]
 

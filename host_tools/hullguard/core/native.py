@@ -171,10 +171,11 @@ class Native:
             self._matrix(place, table)
 
     def _hull(self, h: Any, g: GeneratorTable) -> None:
-        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), self._ints("uint8_t", g.wide), g.taps
-        h.weight, h.settle, h.rest, h.moving = self._reals(g.weight), g.settle, self._reals(g.rest), self._reals(g.moving)
-        h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, g.decay
-        h.tail_input, h.tail_output = self._reals(g.tail_input), self._reals(g.tail_output)
+        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), self._ints("uint8_t", g.wide), self._ints("uint8_t", g.taps)
+        h.weight = self._reals([x for _, _, block in g.blocks for row in block for x in row])
+        h.settle, h.rest, h.moving = g.settle, self._reals(g.rest), self._reals(g.moving)
+        h.rest_left, h.moving_left, h.bias = self._reals(g.rest_left), self._reals(g.moving_left), self._reals(g.bias)
+        h.ready_rest, h.ready_moving, h.decay, h.tail = g.ready_rest, g.ready_moving, self._reals(g.decay), self._reals(g.tail)
 
 
 def frame_out(library: Library, frame: Any) -> Frame:

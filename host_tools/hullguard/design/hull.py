@@ -24,7 +24,10 @@ TAPS_MAX = 200
 SMALLEST_DECAY = 1e-6  # of a generator that forgets all in finite time
 SETTLE_MAX = 2000
 LAGS_MAX = 400  # over which the growth of rounding is followed
-TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add
+TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add to them
+LATE_SHARE = 0.2  # the same when all radii are as wide as after a frame that did not come
+DECAYS = 40  # tried for a tail
+START_SHARE = 0.1  # of the threshold: what the bound of what is left of the initial state may add to it
 BIAS_SHARE = 0.001  # of the threshold: what the last row of the bias tables may be above its limit
 READY_SHARE = 0.10  # of the threshold: what the initial state may still be when a detector is no longer starting
 
@@ -54,14 +57,18 @@ class Ranges:
 class HullTables:
     """What hg_hull_config holds; weights in the order of [y; u], then of the derived signals that have a radius only."""
 
-    weight: Array  # taps x residuals x width and derived
-    rest: Array  # settle x residuals
-    moving: Array  # settle x residuals
+    weight: Array  # most taps x residuals x width and derived; 0 behind a signal's taps
+    taps: tuple[int, ...]  # width and derived
+    rest: Array  # samples x residuals: bias after a start, its last row holds for good; the hull keeps the first `settle` of them
+    moving: Array  # samples x residuals
+    settle: int
+    rest_left: Array  # residuals: what the tail takes over of the initial state then
+    moving_left: Array  # residuals
+    bias: Array  # residuals: from then on
     ready_rest: int
     ready_moving: int
-    decay: float
-    tail_input: Array  # width and derived
-    tail_output: Array  # residuals
+    decay: Array  # residuals
+    tail: Array  # residuals x width and derived
     rounding: Array  # residuals: the part of the bias that is rounding
     steady: Array  # residuals: threshold at the expected radii
 
@@ -151,18 +158,120 @@ def _rounded_tail(decay: float, into: Array, out: Callable[[int], Array]) -> Tai
     return Tail(kept, up32(digits(into * wider, 7)), lambda taps: digits(out(taps) * wider, 7))
 
 
-def _taps(share: Array, constant: Array, tail: Tail, radius: Array, least: int) -> int:
-    """Fewest taps behind which the bound of the tail is a small part of the threshold at the usual radii. `share`: lags x residuals."""
-    limit = TAIL_SHARE * (constant + share.sum(0))
-    bound = float(tail.input @ radius) / (1 - tail.decay)
-    for taps in range(least, TAPS_MAX):
-        if np.all(tail.output(taps) * bound <= limit):
-            return taps
-    return TAPS_MAX
+@dataclass(frozen=True)
+class Envelope:
+    """How impulse responses shrink, for every number of taps and several decays: |h_ig(taps + j)| <= cover decay_i^j for all j >= 0."""
+
+    decay: Array  # residuals x decays, as the tables will have them
+    cover: Array  # taps x residuals x signals x decays
+    behind: Array  # taps x residuals x signals: sum of |h_ig(j)|, j >= taps
+
+    def excess(self, taps: Array, radius: Array) -> Array:
+        """What the tail adds beyond the sum that it bounds, with these radii always (residuals x decays)."""
+        g = np.arange(len(taps))
+        cover, behind = self.cover[taps, :, g], self.behind[taps, :, g]
+        return np.asarray(((cover / (1 - self.decay) - behind[:, :, None]) * radius[:, None, None]).sum(0))
 
 
-def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array, interval_max: int, where: str, derived: Array | None = None) -> HullTables:
-    """All tables of one generator. `radius` (width and derived) is what the radii usually are.
+def _envelope(weights: Array, slowest: Tail, most: int) -> Envelope:
+    """`weights` (lags x residuals x signals): all of |h| but what `slowest` bounds."""
+    length = len(weights)
+    grid = slowest.decay + (1 - slowest.decay) * np.linspace(0.0, 0.9, DECAYS)
+    # A little less than what the table holds: rounding may take that much from a tail each sample.
+    kept = np.minimum(up32(digits(grid * (1 + 1e-6) + 1e-9, 7)), 1 - 2.0**-24)
+    cover = (slowest.output(length)[:, None] * slowest.input)[:, :, None] * np.ones(DECAYS)
+    behind = cover[:, :, 0] / (1 - slowest.decay)
+    covers, sums = np.zeros((most + 1, *cover.shape)), np.zeros((most + 1, *behind.shape))
+    for lag in range(length - 1, -1, -1):
+        cover = np.maximum(weights[lag][:, :, None], cover / grid)
+        behind = behind + weights[lag]
+        if lag <= most:
+            covers[lag], sums[lag] = cover, behind
+    return Envelope(np.tile(kept, (weights.shape[1], 1)), covers, sums)
+
+
+def _taps(envelope: Envelope, limits: tuple[tuple[Array, Array], ...], least: Array, most: int) -> Array:
+    """Few taps behind which no tail adds more than it may: `limits` are radii, and what may be added (residuals) with them.
+
+    From as many for each signal as are enough, one is taken where it hurts least, until none can be.
+    """
+
+    def worst(taps: Array) -> float:
+        parts = [envelope.excess(taps, radius) / limit[:, None] for radius, limit in limits]
+        return float(np.max(parts, axis=0).min(1).max())
+
+    taps = next((t for n in range(1, most) if worst(t := np.maximum(least, n)) <= 1), np.full(len(least), most))
+    spare = set(range(len(taps)))
+    while spare:
+        costs = {}
+        for g in sorted(spare):
+            fewer = taps - (np.arange(len(taps)) == g)
+            costs[g] = worst(fewer) if fewer[g] >= least[g] else np.inf
+        spare = {g for g in spare if costs[g] <= 1}
+        if spare:
+            taps = taps - (np.arange(len(taps)) == min(spare, key=lambda g: costs[g]))
+    return taps
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the initial state adds to a threshold after a start (samples x residuals), and a bound for the sample after the last."""
+
+    added: Array
+    end: Array  # residuals
+
+    def later(self) -> Array:
+        """The most that it adds from each sample on."""
+        return np.asarray(np.maximum.accumulate(np.vstack([self.added, self.end])[::-1])[::-1])
+
+    def forgotten(self, driven: Array, limit: Array, steady: Array) -> int:
+        """The sample from which on the bias is nearly `limit`."""
+        later, last = self.later(), min(SETTLE_MAX, len(self.added) - 1)
+        return next((k for k in range(1, last) if np.all(later[k] + limit - driven[k] <= BIAS_SHARE * steady)), last)
+
+    def rows(self, driven: Array, limit: Array, last: int) -> Array:
+        """The bias, sample by sample; the last row holds for good."""
+        table = np.asarray(driven[: last + 1] + self.added[: last + 1])
+        table[last] = limit + self.later()[last]
+        return table
+
+    def left(self, driven: Array, limit: Array, decay: Array) -> Array:
+        """What a tail must begin with at each sample, if the bias is `limit` from there on (samples x residuals)."""
+        above = np.maximum(self.added + driven - limit, 0.0)
+        left = np.vstack([above, self.end])
+        for k in range(len(above) - 1, -1, -1):
+            left[k] = np.maximum(above[k], left[k + 1] / decay)
+        return left
+
+    def settled(self, driven: Array, limit: Array, steady: Array, decay: Array) -> int:
+        """From which sample on the tail that takes over adds little."""
+        left, above = self.left(driven, limit, decay), np.maximum(self.added + driven - limit, 0.0)
+        last = min(SETTLE_MAX, len(above) - 1)
+        for k in range(1, last):
+            tail = left[k] * decay ** np.arange(len(above) - k)[:, None]
+            if np.all(tail - above[k:] <= START_SHARE * (steady + above[k:])):
+                return k
+        return last
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Radii of a generator's signals (width and derived)."""
+
+    usual: Array  # most of the time
+    late: Array  # one sample after a frame that did not come
+    rewind: tuple[int, ...]  # samples within which one may still be rewritten
+
+
+def _start(lin: Linear, T: Array, F: Array, x: Array) -> Start:
+    """From anywhere in |x(0)| <= x."""
+    added = np.array([mul(np.abs(mul(f, T)), x[:, None])[:, 0] for f in F])
+    bound = _tail(lin, T)
+    return Start(added, bound.output(len(F) + 1) * float((bound.input * x).sum()))
+
+
+def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, expected: Expected, where: str, derived: Array | None = None) -> HullTables:
+    """All tables of one generator.
 
     `derived` (n x derived signals): how derived signals that have a radius only disturb the state.
     """
@@ -172,48 +281,58 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array,
     length = max(64, int(np.ceil(np.log(1e-12) / np.log(max(spectral, 0.05)))))
     if length > 20_000:
         raise InputError(f"{where}: a pole of magnitude {spectral:.6f} is too slow for a threshold; choose poles further inside the unit circle")
-    m = plant.C.shape[0]
+    m, radius = plant.C.shape[0], expected.usual
     F = powers(lin.output, lin.state, length)
     more = mul(T, derived) if derived is not None else np.zeros((lin.state.shape[0], 0))
     entering = np.hstack([lin.input, more])
     at_lag_0 = np.hstack([lin.direct, np.zeros((F.shape[1], more.shape[1]))])
-    weights = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
+    response = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
     loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX))
     lags = loss.weight.shape[0]
+    weights = response.copy()
     weights[:lags] += loss.weight
     steps = np.array([mul(np.abs(f), loss.into_e[:, None])[:, 0] for f in F])
     driven = (np.array([row_sums(np.abs(mul(f, Bd))) for f in F]) + steps).cumsum(0)
     at_once = row_sums(np.abs(Dd)) + loss.into_r
     rounding = steps.sum(0) + loss.into_r + loss.behind
-    initial = np.array([mul(np.abs(mul(f, T)), ranges.initial[:, None])[:, 0] for f in F])
-    moving = np.array([mul(np.abs(mul(f, T)), ranges.state[:, None])[:, 0] for f in F])
+    rest, moving = (_start(lin, T, F, x) for x in (ranges.initial, ranges.state))
 
     share = (weights * radius).sum(2)
+    most = min(TAPS_MAX, length)
+    envelope = _envelope(response, _tail(lin, entering), most)
+    usual, late = driven[-1] + at_once + share.sum(0), driven[-1] + at_once + (weights * expected.late).sum((0, 2))
+    limits = (radius, TAIL_SHARE * usual), (expected.late, LATE_SHARE * late)
+    taps = _taps(envelope, limits, np.maximum(np.array(expected.rewind), 1), most)
+    chosen = np.max([envelope.excess(taps, r) / limit[:, None] for r, limit in limits], axis=0).argmin(1)
+    one = np.arange(len(chosen))
+    decay = envelope.decay[one, chosen]
     # What rounding adds to the lags behind the taps is no impulse response: it goes into the constant, with radii as wide as the ranges.
-    tail = _tail(lin, entering)
-    taps = _taps(share, driven[-1], tail, radius, max(interval_max, 2))
-    at_once = at_once + loss.behind + mul(loss.weight[taps:].sum(0), np.concatenate([2 * ranges.value, ranges.derived])[:, None])[:, 0]
-    driven = np.concatenate([np.zeros((1, F.shape[1])), driven]) + at_once
-    steady = driven[-1] + share.sum(0)
-    limit = driven[-1] * (1 + 1e-9)
-    later = np.maximum.accumulate(moving[::-1])[::-1]
-    settle = next((k for k in range(1, min(SETTLE_MAX, length - 1)) if np.all(later[k] + limit - driven[k] <= BIAS_SHARE * steady)), min(SETTLE_MAX, length - 1))
-    later_rest = np.maximum.accumulate(initial[::-1])[::-1]
-    rest_rows = driven[: settle + 1] + initial[: settle + 1]
-    moving_rows = driven[: settle + 1] + moving[: settle + 1]
-    rest_rows[settle], moving_rows[settle] = limit + later_rest[settle], limit + later[settle]
-    widen = 1 + (taps * weights.shape[2] + 16) * U32 * 1.01
+    widest = np.concatenate([2 * ranges.value, ranges.derived])
+    behind = np.array([loss.weight[t:, :, g].sum(0) for g, t in enumerate(taps)]).T
+    at_once = at_once + loss.behind + mul(behind, widest[:, None])[:, 0]
+    limit = (driven[-1] + at_once) * (1 + 1e-9)
+    driven = np.concatenate([np.zeros((1, F.shape[1])), driven[:-1]]) + at_once
+    steady = limit + share.sum(0)
+    used = np.where(np.arange(taps.max())[:, None, None] < taps, weights[: taps.max()], 0.0)
+    widen = 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
+    slow = decay * (1 - 1e-6)
+    last = moving.forgotten(driven, limit, steady)
+    settle = max(start.settled(driven, limit, steady, slow) for start in (rest, moving))
     return HullTables(
-        weight=up32(weights[:taps] * widen),
-        rest=up32(rest_rows * widen),
-        moving=up32(moving_rows * widen),
-        ready_rest=_ready(initial, steady),
-        ready_moving=_ready(moving, steady),
-        decay=tail.decay,
-        tail_input=tail.input,
-        tail_output=up32(tail.output(taps) * widen),
+        weight=up32(used * widen),
+        taps=tuple(int(t) for t in taps),
+        rest=up32(rest.rows(driven, limit, last) * widen),
+        moving=up32(moving.rows(driven, limit, last) * widen),
+        settle=settle,
+        rest_left=up32(rest.left(driven, limit, slow)[settle] * widen),
+        moving_left=up32(moving.left(driven, limit, slow)[settle] * widen),
+        bias=up32(limit * widen),
+        ready_rest=_ready(rest.added, steady),
+        ready_moving=_ready(moving.added, steady),
+        decay=decay,
+        tail=up32(digits(envelope.cover[taps, :, np.arange(len(taps))][:, one, chosen].T, 7) * (widen + 1e-6)),
         rounding=rounding,
         steady=steady,
     )

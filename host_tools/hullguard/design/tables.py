@@ -120,19 +120,27 @@ class GeneratorTable:
     input: tuple[tuple[float, ...], ...]
     output: tuple[tuple[float, ...], ...]
     direct: tuple[tuple[float, ...], ...]
-    taps: int
-    weight: tuple[tuple[tuple[float, ...], ...], ...]
+    taps: tuple[int, ...]  # of each of `wide`
+    weight: tuple[tuple[tuple[float, ...], ...], ...]  # by lag, residual and signal; 0 behind a signal's taps
     settle: int
     rest: tuple[tuple[float, ...], ...]
+    rest_left: tuple[float, ...]
     moving: tuple[tuple[float, ...], ...]
+    moving_left: tuple[float, ...]
+    bias: tuple[float, ...]
     ready_rest: int
     ready_moving: int
-    decay: float
-    tail_input: tuple[float, ...]
-    tail_output: tuple[float, ...]
+    decay: tuple[float, ...]
+    tail: tuple[tuple[float, ...], ...]  # residuals x wide
     feeds: int
     faults: int
     zonotope: ZonotopeTable | None = None  # the threshold instead of the hull
+
+    @property
+    def blocks(self) -> list[tuple[int, int, list[list[float]]]]:
+        """The weights as they lie in memory: (first residual, signal, taps x 2 or 1) for each two residuals, signal after signal."""
+        pairs = [range(i, min(i + 2, len(self.output))) for i in range(0, len(self.output), 2)]
+        return [(pair[0], g, [[self.weight[lag][i][g] for i in pair] for lag in range(taps)]) for pair in pairs for g, taps in enumerate(self.taps)]
 
 
 @dataclass(frozen=True)
@@ -166,7 +174,7 @@ class Tables:
     @property
     def history(self) -> int:
         """Rows of the ring of radii."""
-        taps = [g.taps + 1 for g in self.generators if g.zonotope is None]
+        taps = [max(g.taps) + 1 for g in self.generators if g.zonotope is None]
         rewinds = [g.interval_max + 1 for g in self.groups] if any(g.zonotope is not None for g in self.generators) else []
         return max(taps + rewinds + [b.window for b in self.banks])
 
@@ -194,7 +202,7 @@ class Tables:
     def reals(self) -> int:
         """hg_detector_reals(), evaluated here so that the generated storage has exactly that length."""
         own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
-        own += sum(g.zonotope.reals for g in self.generators if g.zonotope is not None)
+        own += sum(len(g.output) if g.zonotope is None else g.zonotope.reals for g in self.generators)
         own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
         return 3 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
 
