@@ -15,6 +15,7 @@ from hullguard.design.arith import digits, mul, row_sums, up32
 from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
+from hullguard.design.fixed import lower
 from hullguard.design.ids import ERRORS, POLYNOMIAL, SURE, undetected_patterns
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure, weighted
@@ -45,6 +46,7 @@ class Generator:
     observer: ObserverMatrices
     filter: PostFilter
     linear: hull.Linear
+    given: hull.Given
     tables: hull.HullTables
     zonotope: ZonotopeTable | None  # the threshold instead of the hull
     signal: tuple[int, ...]  # places of its signals
@@ -67,6 +69,7 @@ class Design:
     load_bound: float
     usual: Array  # radii of the whole vector most of the time
     uncertain: tuple[int, ...]  # states whose mismatch is a derived signal, the last ones of the vector
+    fixed_rounding: tuple[float, ...]  # residuals of generators, banks: the part of J that is rounding in fixed point; () where there is none
 
     @property
     def varying(self) -> Varying:
@@ -277,7 +280,17 @@ def finish(model: Model, stored: Stored) -> Design:
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
-    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states)
+    tables, lost = _fixed(model, generators, tables)
+    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states, lost)
+
+
+def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables) -> tuple[Tables, tuple[float, ...]]:
+    """The tables with those for fixed point, or with the reason why there are none; and what rounding costs there, in residual units."""
+    try:
+        made = lower(tables, tuple(g.linear for g in generators), tuple(g.given for g in generators), tuple(g.tables for g in generators), model.path.name)
+    except InputError as reason:
+        return replace(tables, not_fixed=str(reason)), ()
+    return replace(tables, fixed=made.tables), made.rounding
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:
@@ -356,7 +369,8 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     signal = tuple(derived.place.get(k, k) for k in outputs + inputs)
     own = derived.usual[list(signal + derived.uncertain)]
     expected = hull.Expected(own, derived.late[list(signal + derived.uncertain)], tuple(rewind_of(model, k) for k in signal + derived.uncertain))
-    table = hull.build(linear, T, sub, ranges, expected, f"{model.path.name}: detector.observers[{i}]", np.eye(plant.n)[:, list(derived.states)])
+    given = hull.Given(T, sub, ranges, expected, np.eye(plant.n)[:, list(derived.states)])
+    table = hull.build(linear, given, f"{model.path.name}: detector.observers[{i}]")
     ball = _zonotope(model, linear, T, sub, ranges, own, table, signal, derived, f"{model.path.name}: detector.observers[{i}]")
     paths = fault_paths(model, spec, spec.faults)
     blind = np.full(len(paths), np.inf)
@@ -367,7 +381,7 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
         except (np.linalg.LinAlgError, ValueError):
             pass  # without the event error the factorisation may not exist; then there is nothing to compare with
     delay = fault_delays(bounded, o, f, paths, radius[outputs + inputs], spec.search.size) if spec.filtered else np.full(len(paths), np.nan)
-    return Generator(spec, bounded, o, f, linear, table, ball, signal, own, found.smallest, found.first, delay, blind)
+    return Generator(spec, bounded, o, f, linear, given, table, ball, signal, own, found.smallest, found.first, delay, blind)
 
 
 def _zonotope(

@@ -27,6 +27,8 @@ LAGS_MAX = 400  # over which the growth of rounding is followed
 TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add to them
 LATE_SHARE = 0.2  # the same when all radii are as wide as after a frame that did not come
 DECAYS = 40  # tried for a tail
+DOUBLE = 1 + 1e-9  # more than what double precision loses
+SLOWER = 1 - 1e-6  # a tail is made for a decay that much below the table's: rounding may take that much from it each sample
 START_SHARE = 0.1  # of the threshold: what the bound of what is left of the initial state may add to it
 BIAS_SHARE = 0.001  # of the threshold: what the last row of the bias tables may be above its limit
 READY_SHARE = 0.10  # of the threshold: what the initial state may still be when a detector is no longer starting
@@ -83,14 +85,25 @@ class Rounding:
     behind: Array  # residuals: what later lags can add for radii as wide as the ranges
 
 
-def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int) -> Rounding:
+@dataclass(frozen=True)
+class Fixed:
+    """Fixed-point arithmetic: what a step of each number is, signal units."""
+
+    state: Array  # order
+    residual: Array  # residuals
+    like: HullTables  # of the same generator in float32: same taps, decays and rows
+
+
+def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int, fixed: Fixed | None = None) -> Rounding:
     """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius.
+
+    In fixed point sums are exact, and each loses half a step of its number in the end.
 
     `more` (order x derived): how radii enter e that come with no value; nothing is rounded where they enter, only what they do to e later.
     """
     s, width = lin.input.shape
     m = plant.C.shape[0]
-    gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    gamma = 0.0 if fixed else (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
     x, u, v = ranges.state[:, None], ranges.input[:, None], ranges.value[:, None]
     widest = np.concatenate([2 * ranges.value, ranges.derived])[:, None]
     G, E, F, D = np.abs(lin.state), np.abs(lin.input), np.abs(lin.output), np.abs(lin.direct)
@@ -103,6 +116,9 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     into_r = mul(np.abs(mul(lin.output, T) + mul(Dy, plant.C)), x) + mul(np.abs(mul(Dy, plant.D) + Du), u)
     into_e += gamma * (mul(G, z) + mul(E, v))
     into_r += gamma * (mul(F, z) + mul(D, v))
+    if fixed:
+        into_e += fixed.state[:, None] / 2 * DOUBLE
+        into_r += fixed.residual[:, None] / 2 * DOUBLE
     # The part that does: |e(k)| <= sum over j of |G^j E| radius(k-1-j), and the value's own radius.
     none = np.zeros((s, more.shape[1]))
     into_z = np.array([np.abs(np.hstack([mul(p, lin.input), mul(p, more)])) for p in P])
@@ -173,13 +189,18 @@ class Envelope:
         return np.asarray(((cover / (1 - self.decay) - behind[:, :, None]) * radius[:, None, None]).sum(0))
 
 
-def _envelope(weights: Array, slowest: Tail, most: int) -> Envelope:
-    """`weights` (lags x residuals x signals): all of |h| but what `slowest` bounds."""
+def _decays(slowest: Tail, residuals: int) -> Array:
+    """What a tail may shrink by (residuals x decays)."""
+    return np.tile(up32(digits(slowest.decay + (1 - slowest.decay) * np.linspace(0.002, 0.9, DECAYS), 7)), (residuals, 1))
+
+
+def _envelope(weights: Array, slowest: Tail, most: int, kept: Array) -> Envelope:
+    """`weights` (lags x residuals x signals): all of |h| but what `slowest` bounds; `kept`: the decays."""
     length = len(weights)
-    grid = slowest.decay + (1 - slowest.decay) * np.linspace(0.0, 0.9, DECAYS)
-    # A little less than what the table holds: rounding may take that much from a tail each sample.
-    kept = np.minimum(up32(digits(grid * (1 + 1e-6) + 1e-9, 7)), 1 - 2.0**-24)
-    cover = (slowest.output(length)[:, None] * slowest.input)[:, :, None] * np.ones(DECAYS)
+    grid = kept[:, None, :] * SLOWER
+    if grid.min() < slowest.decay:
+        raise InputError("the generator decays too slowly for a threshold: choose poles further inside the unit circle")
+    cover = (slowest.output(length)[:, None] * slowest.input)[:, :, None] * np.ones(kept.shape[1])
     behind = cover[:, :, 0] / (1 - slowest.decay)
     covers, sums = np.zeros((most + 1, *cover.shape)), np.zeros((most + 1, *behind.shape))
     for lag in range(length - 1, -1, -1):
@@ -187,7 +208,7 @@ def _envelope(weights: Array, slowest: Tail, most: int) -> Envelope:
         behind = behind + weights[lag]
         if lag <= most:
             covers[lag], sums[lag] = cover, behind
-    return Envelope(np.tile(kept, (weights.shape[1], 1)), covers, sums)
+    return Envelope(kept, covers, sums)
 
 
 def _taps(envelope: Envelope, limits: tuple[tuple[Array, Array], ...], least: Array, most: int) -> Array:
@@ -270,11 +291,20 @@ def _start(lin: Linear, T: Array, F: Array, x: Array) -> Start:
     return Start(added, bound.output(len(F) + 1) * float((bound.input * x).sum()))
 
 
-def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, expected: Expected, where: str, derived: Array | None = None) -> HullTables:
-    """All tables of one generator.
+@dataclass(frozen=True)
+class Given:
+    """What the tables of one generator follow from, besides its matrices."""
 
-    `derived` (n x derived signals): how derived signals that have a radius only disturb the state.
-    """
+    T: Array
+    plant: SubPlant
+    ranges: Ranges
+    expected: Expected
+    derived: Array  # n x derived signals: how those disturb the state that have a radius only
+
+
+def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> HullTables:
+    """All tables of one generator, rounded up to float32; for fixed point not yet rounded."""
+    T, plant, ranges, expected = given.T, given.plant, given.ranges, given.expected
     spectral = float(np.abs(np.linalg.eigvals(lin.state)).max())
     if spectral >= 1.0 - 1e-6:
         raise InputError(f"{where}: a pole of the fused observer has magnitude {spectral:.6f}; poles must be inside the unit circle")
@@ -283,13 +313,13 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, expected: Expe
         raise InputError(f"{where}: a pole of magnitude {spectral:.6f} is too slow for a threshold; choose poles further inside the unit circle")
     m, radius = plant.C.shape[0], expected.usual
     F = powers(lin.output, lin.state, length)
-    more = mul(T, derived) if derived is not None else np.zeros((lin.state.shape[0], 0))
+    more = mul(T, given.derived)
     entering = np.hstack([lin.input, more])
     at_lag_0 = np.hstack([lin.direct, np.zeros((F.shape[1], more.shape[1]))])
     response = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
-    loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX))
+    loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX), fixed)
     lags = loss.weight.shape[0]
     weights = response.copy()
     weights[:lags] += loss.weight
@@ -301,10 +331,11 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, expected: Expe
 
     share = (weights * radius).sum(2)
     most = min(TAPS_MAX, length)
-    envelope = _envelope(response, _tail(lin, entering), most)
+    slowest = _tail(lin, entering)
+    envelope = _envelope(response, slowest, most, fixed.like.decay[:, None] if fixed else _decays(slowest, F.shape[1]))
     usual, late = driven[-1] + at_once + share.sum(0), driven[-1] + at_once + (weights * expected.late).sum((0, 2))
     limits = (radius, TAIL_SHARE * usual), (expected.late, LATE_SHARE * late)
-    taps = _taps(envelope, limits, np.maximum(np.array(expected.rewind), 1), most)
+    taps = np.array(fixed.like.taps) if fixed else _taps(envelope, limits, np.maximum(np.array(expected.rewind), 1), most)
     chosen = np.max([envelope.excess(taps, r) / limit[:, None] for r, limit in limits], axis=0).argmin(1)
     one = np.arange(len(chosen))
     decay = envelope.decay[one, chosen]
@@ -312,27 +343,31 @@ def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, expected: Expe
     widest = np.concatenate([2 * ranges.value, ranges.derived])
     behind = np.array([loss.weight[t:, :, g].sum(0) for g, t in enumerate(taps)]).T
     at_once = at_once + loss.behind + mul(behind, widest[:, None])[:, 0]
+    if fixed:  # a threshold rounds its sum, and a tail two products a sample
+        own = fixed.residual * (1 + 1 / (1 - decay))
+        at_once, rounding = at_once + own, rounding + own
     limit = (driven[-1] + at_once) * (1 + 1e-9)
     driven = np.concatenate([np.zeros((1, F.shape[1])), driven[:-1]]) + at_once
     steady = limit + share.sum(0)
     used = np.where(np.arange(taps.max())[:, None, None] < taps, weights[: taps.max()], 0.0)
-    widen = 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
-    slow = decay * (1 - 1e-6)
+    widen = DOUBLE if fixed else 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
+    up: Callable[[Array], Array] = np.asarray if fixed else up32
+    slow = decay * SLOWER
     last = moving.forgotten(driven, limit, steady)
-    settle = max(start.settled(driven, limit, steady, slow) for start in (rest, moving))
+    settle = fixed.like.settle if fixed else max(start.settled(driven, limit, steady, slow) for start in (rest, moving))
     return HullTables(
-        weight=up32(used * widen),
+        weight=up(used * widen),
         taps=tuple(int(t) for t in taps),
-        rest=up32(rest.rows(driven, limit, last) * widen),
-        moving=up32(moving.rows(driven, limit, last) * widen),
+        rest=up(rest.rows(driven, limit, last) * widen),
+        moving=up(moving.rows(driven, limit, last) * widen),
         settle=settle,
-        rest_left=up32(rest.left(driven, limit, slow)[settle] * widen),
-        moving_left=up32(moving.left(driven, limit, slow)[settle] * widen),
-        bias=up32(limit * widen),
+        rest_left=up(rest.left(driven, limit, slow)[settle] * widen),
+        moving_left=up(moving.left(driven, limit, slow)[settle] * widen),
+        bias=up(limit * widen),
         ready_rest=_ready(rest.added, steady),
         ready_moving=_ready(moving.added, steady),
         decay=decay,
-        tail=up32(digits(envelope.cover[taps, :, np.arange(len(taps))][:, one, chosen].T, 7) * (widen + 1e-6)),
+        tail=up(digits(envelope.cover[taps, :, np.arange(len(taps))][:, one, chosen].T, 7) * (widen + 1e-6)),
         rounding=rounding,
         steady=steady,
     )

@@ -46,6 +46,8 @@ class SignalTable:
     span: float
     middle: float
     zero: int
+    exponent: int = 0  # of the resolution in fixed point
+    unit: int = 0  # its values and radii are these numbers times 2^unit
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,7 @@ class MismatchTable:
     signal: tuple[int, ...]
     constant: tuple[float, ...]
     gain: tuple[tuple[float, ...], ...]  # states x signals
+    exponent: int = 0
 
 
 @dataclass(frozen=True)
@@ -135,6 +138,7 @@ class GeneratorTable:
     feeds: int
     faults: int
     zonotope: ZonotopeTable | None = None  # the threshold instead of the hull
+    exponents: tuple[int, int, int] = (0, 0, 0)  # of state and input, of output and direct, of weight and tail
 
     @property
     def blocks(self) -> list[tuple[int, int, list[list[float]]]]:
@@ -160,6 +164,10 @@ class Tables:
     predictors: tuple[PredictTable, ...] = ()
     mismatch: MismatchTable | None = None
     banks: tuple[BankTable, ...] = ()
+    fixed: Tables | None = None  # the same in fixed point, or
+    not_fixed: str = ""  # why there is none
+    units: tuple[int, ...] = ()  # of fixed point: numbers are times 2^unit; the signal vector, then the residuals
+    float_hash: int | None = None  # of fixed point: it is the same model
 
     @property
     def signals(self) -> int:
@@ -214,7 +222,9 @@ class Tables:
     @property
     def hash(self) -> int:
         """32 bits that change with any number above: host and node compare them."""
-        text = json.dumps(_plain(self), sort_keys=True, separators=(",", ":"))
+        if self.float_hash is not None:
+            return self.float_hash
+        text = json.dumps(_plain(replace(self, fixed=None, not_fixed="")), sort_keys=True, separators=(",", ":"))
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
 
 
