@@ -22,6 +22,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* Generated tables carry both kinds of numbers. */
+#if HG_REAL_Q31
+#define HG_REAL_T(x, q) (q)
+#define HG_EXPONENT(e) (e)
+#else
+#define HG_REAL_T(x, q) HG_REAL_C(x)
+#define HG_EXPONENT(e) 0
+#endif
+
 #if HG_REAL_Q31
 typedef int32_t hg_real;
 typedef int64_t hg_acc;

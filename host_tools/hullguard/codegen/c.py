@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from hullguard.codegen.both import Both, Scaled, both
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
@@ -32,7 +34,13 @@ def real(x: float) -> str:
     mantissa, exponent = x.hex().split("p")
     if "." in mantissa:
         mantissa = mantissa.rstrip("0").rstrip(".")
-    return f"HG_REAL_C({mantissa}p{exponent})"
+    literal = f"{mantissa}p{exponent}"
+    return f"HG_REAL_T({literal}, {x.fixed})" if isinstance(x, Both) else f"HG_REAL_C({literal})"
+
+
+def scaled(x: int) -> str:
+    """An exponent: only fixed point has any."""
+    return f"HG_EXPONENT({x.fixed})" if isinstance(x, Scaled) else str(x)
 
 
 def reals(row: Iterable[float]) -> list[str]:
@@ -143,6 +151,13 @@ def _limits(tables: Tables) -> list[str]:
     for macro, least in needed:
         if least > 1:  # config.h allows no less than 1
             lines += [f"#if {macro} < {least}U", f'#error "model {tables.name} needs {macro} of at least {least}"', "#endif"]
+    parts = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch))
+    for part, used in parts:
+        if used:
+            lines += [f"#if !HG_WITH_{part}", f'#error "model {tables.name} needs HG_WITH_{part}"', "#endif"]
+    if tables.fixed is None:
+        reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
+        lines += ["#if HG_REAL_Q31", f'#error "{reason}"', "#endif"]
     return [*lines, ""] if lines else []
 
 
@@ -200,6 +215,17 @@ def _kind(g: GroupTable, closes: bool) -> str:
     return "periodic" if g.periodic else "event"
 
 
+def _units(macro: str, tables: Tables) -> list[str]:
+    """What a program needs that has numbers of its own to convert."""
+    if tables.fixed is None:
+        return []
+    units = ", ".join(str(u) for u in tables.fixed.units[: tables.signals])
+    return [
+        *comment("Initialiser of the signals' units: with HG_REAL_Q31 a value or radius x is held as the integer x 2^(31 - unit), below 2^31."),
+        f"#define {macro} {{{units}}}",
+    ]
+
+
 def _header(design: Design, names: Names) -> str:
     tables, model = design.tables, design.model
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
@@ -233,6 +259,7 @@ def _header(design: Design, names: Names) -> str:
         "/* Initialisers of arrays of names, for programs that talk to people. */",
         *(_strings(f"{prefix}_SIGNAL_NAMES", names.signals) if signals else []),
         *_strings(f"{prefix}_GROUP_NAMES", names.groups),
+        *_units(f"{prefix}_UNITS", tables),
         *(_strings(f"{prefix}_FAULT_NAMES", names.faults) if names.faults else []),
         "",
         "/* Constants of the detector node. */",
@@ -267,7 +294,7 @@ def _distinct(model: str, names: Names) -> None:
 def _scale(s: SignalTable) -> list[str]:
     return [
         f"    {{.resolution = {real(s.resolution)}, .offset = {real(s.offset)}, .per_unit = {real(s.per_unit)},",
-        f"     .minimum = {s.minimum}, .maximum = {s.maximum}}}, /* {s.name} */",
+        f"     .exponent = {scaled(s.exponent)}, .minimum = {s.minimum}, .maximum = {s.maximum}}}, /* {s.name} */",
     ]
 
 
@@ -469,7 +496,8 @@ def _mismatch(m: MismatchTable | None, signals: Sequence[str]) -> list[str]:
     return [
         *lines,
         f"static const hg_mismatch_config mismatch = {{.states = {states}U, .width = {width}U, .signal = {present('mismatch_signal', m.signal)},",
-        f"                                            .constant = mismatch_constant, .gain = {present('mismatch_gain', m.signal)}}};",
+        f"                                            .constant = mismatch_constant, .gain = {present('mismatch_gain', m.signal)},",
+        f"                                            .exponent = {scaled(m.exponent)}}};",
         "",
     ]
 
@@ -504,7 +532,7 @@ def _banks(tables: Tables, signals: Sequence[str]) -> list[str]:
         lines += [
             f"    {{.certificates = {b.certificates}U, .window = {b.window}U, .width = {len(b.signal)}U, .signal = {n}_signal, .weight = {n}_weight,",
             f"     .extras = {len(b.extra)}U, .extra = {present(n + '_extra', b.extra)}, .extra_weight = {present(n + '_extra_weight', b.extra)},",
-            f"     .bias = {n}_bias, .widen = {real(b.widen)}}},",
+            f"     .bias = {n}_bias, .widen = {real(b.widen)}, .exponent = {scaled(b.exponent)}}},",
         ]
     return [*lines, "};", ""]
 
@@ -516,12 +544,13 @@ def _generators(tables: Tables) -> list[str]:
     lines = [*comment(f"residual [{count}]: the residual generators"), "static const hg_residual_config residual[] = {"]
     for i, g in enumerate(tables.generators):
         n, order, width, residuals = f"generator{i + 1}", len(g.state), len(g.signal), len(g.output)
+        moved, shown = scaled(g.exponents[0]), scaled(g.exponents[1])
         lines += [
             f"    {{.order = {order}U, .residuals = {residuals}U, .width = {width}U, .signal = {n}_signal,",
-            f"     .state = {{.rows = {order}U, .cols = {order}U, .exponent = 0, .data = {n}_state}},",
-            f"     .input = {{.rows = {order}U, .cols = {width}U, .exponent = 0, .data = {n}_input}},",
-            f"     .output = {{.rows = {residuals}U, .cols = {order}U, .exponent = 0, .data = {n}_output}},",
-            f"     .direct = {{.rows = {residuals}U, .cols = {width}U, .exponent = 0, .data = {n}_direct}}}},",
+            f"     .state = {{.rows = {order}U, .cols = {order}U, .exponent = {moved}, .data = {n}_state}},",
+            f"     .input = {{.rows = {order}U, .cols = {width}U, .exponent = {moved}, .data = {n}_input}},",
+            f"     .output = {{.rows = {residuals}U, .cols = {order}U, .exponent = {shown}, .data = {n}_output}},",
+            f"     .direct = {{.rows = {residuals}U, .cols = {width}U, .exponent = {shown}, .data = {n}_direct}}}},",
         ]
     lines += ["};", ""]
     if zonotopes(tables):
@@ -530,7 +559,7 @@ def _generators(tables: Tables) -> list[str]:
     for i, g in enumerate(tables.generators):
         n = f"generator{i + 1}"
         lines += [
-            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .exponent = 0, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'},",
+            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .exponent = {scaled(g.exponents[2])}, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'},",
             f"     .taps = {n}_taps, .weight = {n}_weight, .settle = {g.settle}U, .rest = {n}_rest, .rest_left = {n}_rest_left,",
             f"     .moving = {n}_moving, .moving_left = {n}_moving_left, .bias = {n}_bias,",
             f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay, .tail = {n}_tail}},",
@@ -661,4 +690,4 @@ def _source(design: Design, names: Names) -> str:
 def emit_c(design: Design) -> tuple[str, str]:
     """Text of NAME.h and NAME.c."""
     names = names_of(design)
-    return _header(design, names), _source(design, names)
+    return _header(design, names), _source(replace(design, tables=both(design.tables)), names)

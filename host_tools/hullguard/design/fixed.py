@@ -117,7 +117,8 @@ def _refuse(tables: Tables, where: str) -> None:
         raise InputError(f"{where}: not for fixed point: the columns of a zonotope have no proven range; set detector.threshold = \"exact\"")
     if tables.predictors:
         name = tables.groups[tables.predictors[0].group].name
-        raise InputError(f"{where}: not for fixed point: the prediction of '{name}' copies the plant without feedback and has no range that holds for any data; set detector.prediction = false")
+        cure = "set detector.prediction = false"
+        raise InputError(f"{where}: not for fixed point: the prediction of '{name}' copies the plant without feedback and has no range that holds for any data; {cure}")
     for g in tables.groups:
         for s in g.signals:
             if s.flags & FLOAT32:
