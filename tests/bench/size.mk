@@ -1,0 +1,36 @@
+# make size: flash, RAM and stack of every model on every target, beside the budget of tests/bench/budget.toml.
+# A number that grew fails; make size-budget takes today's numbers for the budget, to be looked at in the difference and committed.
+
+SIZE_PARTS := detector node sensor
+
+# The part of it in `make test`: the smallest core, one with an FPU, and another instruction set.
+SIZE_QUICK := cortex_m0 cortex_m4f rv32imac
+
+size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(MODELS),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
+size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
+size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '$(call size_cross,$(1))' $(2) $(call size_elfs,$(1))
+
+.PHONY: size size-quick size-budget
+TEST_PARTS += size-quick
+size: $(call size_elfs,$(TARGETS)) ## flash, RAM and worst-case stack, beside their budget; JSON=1, FORMAT=markdown
+	@$(call size_run,$(TARGETS),$(if $(JSON),--json) $(if $(FORMAT),--format $(FORMAT)))
+size-quick: $(call size_elfs,$(SIZE_QUICK)) ## the same of a few targets
+	@$(call size_run,$(SIZE_QUICK),--quiet)
+size-budget: $(call size_elfs,$(TARGETS)) ## take today's sizes for the budget
+	@$(call size_run,$(TARGETS),--write)
+
+# $(call size_program,TARGET,REAL,MODEL,PART)
+define size_program
+OBJECTS += $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o
+$(BENCH)/$(1)-$(2)/$(3)/size_$(4).o: tests/bench/size_$(4).c $(BENCH)/$(3)_record.h Makefile
+	@mkdir -p $$(@D)
+	$$(Q)$$(call bench_cc,$(1),$(2)) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
+$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(addprefix $(BENCH)/$(1)-$(2)/,$(3)/size_$(4).o $(addsuffix .o,$(basename $(LIB_SRC) $(if $(filter detector,$(4)),,firmware/models/$(3).c) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c))) hal/start/image.ld
+	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -Wl,-Map=$$(@:.elf=.map) -nostdlib -o $$@ $$(filter %.o,$$^) -lgcc
+endef
+
+define size_target
+$(eval $(call objects,$(BENCH)/$(1)-$(2),tests/bench/size_port.c,$$(call bench_cc,$(1),$(2))))
+$(foreach m,$(MODELS),$(foreach p,$(SIZE_PARTS),$(eval $(call size_program,$(1),$(2),$(m),$(p)))))
+endef
+$(foreach r,$(BENCH_REALS),$(foreach t,$(TARGETS),$(eval $(call size_target,$(t),$(r)))))
