@@ -23,10 +23,12 @@ OPTIMISE := -O2 -g
 DEPEND    = -MMD -MP
 SANITIZE := -O1 -g -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=undefined
 
-# The number types the library is built for on the host, and the tool sets every test is built with.
-REALS := f32 f64
+# The number types the library is built for on the host; unit tests compute with the float ones. And the tool sets every test is built with.
+FLOATS := f32 f64
+REALS  := $(FLOATS) q31
 REAL_FLAG_f32 := -DHG_REAL_F32=1
 REAL_FLAG_f64 := -DHG_REAL_F64=1
+REAL_FLAG_q31 := -DHG_REAL_Q31=1
 TOOLSETS := gcc asan clang
 CC_gcc     = $(CC) $(OPTIMISE)
 CC_asan    = $(CC) $(SANITIZE),address
@@ -125,7 +127,7 @@ $(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%.ok): %.ok: % $(UNIT_DATA)
 	@$$(call run_test,$$<,$$*)
 unit: $(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%.ok)
 endef
-$(foreach t,$(TOOLSETS),$(foreach r,$(REALS),$(eval $(call unit_variant,$(t),$(r)))))
+$(foreach t,$(TOOLSETS),$(foreach r,$(FLOATS),$(eval $(call unit_variant,$(t),$(r)))))
 
 # --- with-vcan: a CAN bus on machines whose kernel has none ----------------------------------------------------------------------------
 

@@ -5,7 +5,8 @@
 bool hg_bank_valid(const hg_bank_config *config, uint8_t values, uint8_t radii, uint8_t length)
 {
     bool valid = (config->certificates >= 1U) && (config->window >= 1U) && (config->window <= length) && (config->width >= 1U) &&
-                 (config->signal != NULL) && (config->weight != NULL) && (config->bias != NULL) && (config->widen >= HG_REAL_C(1.0));
+                 (config->signal != NULL) && (config->weight != NULL) && (config->bias != NULL) && (config->widen >= HG_REAL_C(1.0)) &&
+                 hg_exponent_valid(config->exponent);
     valid = valid && ((config->extras == 0U) || ((config->extra != NULL) && (config->extra_weight != NULL)));
     for (uint8_t g = 0U; valid && (g < config->width); g++) {
         valid = (config->signal[g] < values) && (config->signal[g] < radii);
@@ -46,7 +47,7 @@ static void add_sample(const hg_bank *self, const hg_real *weight, const hg_real
     for (uint8_t g = 0U; g < config->width; g++) {
         const hg_real *row = &weight[(uint16_t)g * n];
         const hg_real v = value[config->signal[g]];
-        const hg_real wide = hg_real_mul(config->widen, radius[config->signal[g]]);
+        const hg_real wide = hg_real_widen(radius[config->signal[g]], config->widen);
         for (uint8_t c = 0U; c < n; c++) {
             residual[c] = hg_acc_mac(residual[c], row[c], v);
             threshold[c] = hg_acc_mac(threshold[c], hg_real_abs(row[c]), wide);
@@ -88,7 +89,7 @@ static bool nearer(hg_real r, hg_real J, hg_real best_r, hg_real best_J)
 {
     const hg_real a = hg_real_abs(r);
     const hg_real b = hg_real_abs(best_r);
-    return ((a > J) == (b > best_J)) ? (hg_real_mul(a, best_J) > hg_real_mul(b, J)) : (a > J);
+    return ((a > J) == (b > best_J)) ? (hg_acc_mac(hg_acc_zero(), a, best_J) > hg_acc_mac(hg_acc_zero(), b, J)) : (a > J);
 }
 
 hg_status hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *radius, hg_real *r, hg_real *J)
@@ -103,8 +104,8 @@ hg_status hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *radiu
     add_window(self, value, radius);
     self->closest = 0U;
     for (uint8_t c = 0U; c < config->certificates; c++) {
-        const hg_real residual = hg_acc_real(self->sum[c], 0);
-        const hg_real threshold = config->bias[c] + hg_acc_real(self->sum[(uint16_t)c + config->certificates], 0);
+        const hg_real residual = hg_acc_real(self->sum[c], config->exponent);
+        const hg_real threshold = hg_real_add(config->bias[c], hg_acc_real(self->sum[(uint16_t)c + config->certificates], config->exponent));
         if ((!hg_real_finite(residual)) || (!hg_real_finite(threshold))) {
             *r = HG_REAL_ZERO;
             *J = config->bias[0];

@@ -4,6 +4,34 @@
 
 #define WIDER HG_REAL_C(1.000001) /* more than the rounding of a difference can take away */
 
+/* Parts that an image does without are constants here, so that the compiler drops them and the linker what they call. */
+static uint8_t predictors_of(const hg_detector_config *config)
+{
+    return (HG_WITH_PREDICT != 0) ? config->predictors : 0U;
+}
+
+static uint8_t banks_of(const hg_detector_config *config)
+{
+    return (HG_WITH_BANK != 0) ? config->banks : 0U;
+}
+
+static bool with_mismatch(const hg_detector_config *config)
+{
+    return (HG_WITH_MISMATCH != 0) && (config->mismatch != NULL);
+}
+
+static bool by_zonotope(const hg_detector_config *config)
+{
+    return (HG_WITH_ZONOTOPE != 0) && (config->zonotope != NULL);
+}
+
+/* Has this image all that a configuration asks for? */
+static bool parts_there(const hg_detector_config *config)
+{
+    return (predictors_of(config) == config->predictors) && (banks_of(config) == config->banks) &&
+           (with_mismatch(config) == (config->mismatch != NULL)) && (by_zonotope(config) == (config->zonotope != NULL));
+}
+
 uint32_t hg_detector_reals(const hg_detector_config *config)
 {
     uint32_t reals = (3U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals);
@@ -11,11 +39,14 @@ uint32_t hg_detector_reals(const hg_detector_config *config)
     for (uint8_t g = 0U; g < config->generators; g++) {
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
     }
-    for (uint8_t g = 0U; (config->zonotope != NULL) && (g < config->generators); g++) {
+    for (uint8_t g = 0U; (config->hull != NULL) && (g < config->generators); g++) {
+        reals += HG_HULL_REALS(config->hull[g].residuals);
+    }
+    for (uint8_t g = 0U; by_zonotope(config) && (g < config->generators); g++) {
         const hg_zonotope_config *zonotope = &config->zonotope[g];
         reals += HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances);
     }
-    for (uint8_t i = 0U; i < config->predictors; i++) {
+    for (uint8_t i = 0U; i < predictors_of(config); i++) {
         reals += HG_PREDICT_REALS(config->predict[i].order, config->predict[i].inputs, config->predict[i].width);
     }
     return reals;
@@ -24,7 +55,7 @@ uint32_t hg_detector_reals(const hg_detector_config *config)
 uint32_t hg_detector_sums(const hg_detector_config *config)
 {
     uint32_t sums = 0U;
-    for (uint8_t b = 0U; b < config->banks; b++) {
+    for (uint8_t b = 0U; b < banks_of(config); b++) {
         sums += HG_BANK_SUMS(config->bank[b].certificates);
     }
     return sums;
@@ -55,7 +86,7 @@ static bool derived_valid(const hg_detector_config *config)
 {
     uint16_t width = config->signals;
     bool valid = true;
-    for (uint8_t i = 0U; valid && (i < config->predictors); i++) {
+    for (uint8_t i = 0U; valid && (i < predictors_of(config)); i++) {
         const hg_predict_config *predict = &config->predict[i];
         uint16_t first = 0U;
         valid = (predict->group < config->groups) && hg_predict_valid(predict, config->signals);
@@ -65,19 +96,33 @@ static bool derived_valid(const hg_detector_config *config)
         valid = valid && (predict->first == first) && (predict->width == config->hold[predict->group].trigger->width);
         width += predict->width;
     }
-    if (valid && (config->mismatch != NULL)) {
+    if (valid && with_mismatch(config)) {
         valid = hg_mismatch_valid(config->mismatch, config->signals);
         width += config->mismatch->states;
     }
     return valid && (width == config->width);
 }
 
-/* A rewind must end inside the taps: what a tail has taken in cannot be corrected. A zonotope needs the old radii of all that is rewritten. */
-static bool rewinds_end(const hg_detector_config *config, uint8_t inside)
+/* Samples within which a signal's radius may still be rewritten: interval_max of its group, or of any for a signal that is derived from several. */
+static uint8_t rewinds_of(const hg_detector_config *config, uint8_t place)
 {
-    bool valid = true;
+    uint8_t longest = 0U;
+    uint16_t end = 0U;
     for (uint8_t i = 0U; i < config->groups; i++) {
-        valid = valid && (config->hold[i].trigger->interval_max <= inside);
+        const hg_trigger_config *trigger = config->hold[i].trigger;
+        const bool own = (place >= end) && (place < (end + trigger->width));
+        end += trigger->width;
+        longest = ((own || (place >= config->signals)) && (trigger->interval_max > longest)) ? trigger->interval_max : longest;
+    }
+    return longest;
+}
+
+/* A rewind must end inside the taps: what a tail has taken in cannot be corrected. */
+static bool rewinds_end(const hg_detector_config *config, const hg_hull_config *hull)
+{
+    bool valid = (hull->signal != NULL) && (hull->taps != NULL);
+    for (uint8_t g = 0U; valid && (g < hull->width); g++) {
+        valid = rewinds_of(config, hull->signal[g]) <= hull->taps[g];
     }
     return valid;
 }
@@ -87,9 +132,9 @@ static bool generator_valid(const hg_detector_config *config, uint8_t g)
     const hg_residual_config *residual = &config->residual[g];
     bool valid = false;
     if (config->hull != NULL) {
-        valid = (residual->residuals == config->hull[g].residuals) && rewinds_end(config, config->hull[g].taps);
+        valid = (residual->residuals == config->hull[g].residuals) && rewinds_end(config, &config->hull[g]);
     } else {
-        valid = (residual->residuals == config->zonotope[g].residuals) && rewinds_end(config, (uint8_t)(config->history - 1U));
+        valid = (residual->residuals == config->zonotope[g].residuals) && (rewinds_of(config, UINT8_MAX) < config->history); /* it needs the old radii of all that is rewritten */
     }
     valid = valid && (residual->signal != NULL);
     for (uint8_t i = 0U; valid && (i < residual->width); i++) {
@@ -106,7 +151,7 @@ static bool generators_valid(const hg_detector_config *config)
         valid = generator_valid(config, g);
         residuals += config->residual[g].residuals;
     }
-    for (uint8_t b = 0U; valid && (b < config->banks); b++) {
+    for (uint8_t b = 0U; valid && (b < banks_of(config)); b++) {
         valid = (config->bank[b].window <= config->history) && hg_bank_valid(&config->bank[b], config->signals, config->width, config->window);
     }
     return valid && (residuals == config->residuals);
@@ -138,8 +183,9 @@ static hg_status start_generators(hg_detector *self, hg_start how)
         status = hg_residual_start(&self->memory.residual[g], &config->residual[g], memory);
         memory = &memory[HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width)];
         if ((status == HG_OK) && (config->hull != NULL)) {
-            status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how);
-        } else if (status == HG_OK) {
+            status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how, memory);
+            memory = &memory[HG_HULL_REALS(config->hull[g].residuals)];
+        } else if ((status == HG_OK) && by_zonotope(config)) {
             const hg_zonotope_config *zonotope = &config->zonotope[g];
             status = hg_zonotope_start(&self->memory.zonotope[g], zonotope, &self->radii, how, memory);
             memory = &memory[HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances)];
@@ -147,16 +193,16 @@ static hg_status start_generators(hg_detector *self, hg_start how)
             /* refused */
         }
     }
-    for (uint8_t i = 0U; (status == HG_OK) && (i < config->predictors); i++) {
+    for (uint8_t i = 0U; (status == HG_OK) && (i < predictors_of(config)); i++) {
         const hg_predict_config *predict = &config->predict[i];
         status = hg_predict_start(&self->memory.predict[i], predict, memory);
         memory = &memory[HG_PREDICT_REALS(predict->order, predict->inputs, predict->width)];
     }
-    if ((status == HG_OK) && (config->banks > 0U)) {
+    if ((status == HG_OK) && (banks_of(config) > 0U)) {
         hg_acc *sum = self->memory.sum;
         /* No pointer is null and no size 0 any more: none of these can fail. */
         (void)hg_ring_start(&self->values, config->signals, config->window, memory);
-        for (uint8_t b = 0U; b < config->banks; b++) {
+        for (uint8_t b = 0U; b < banks_of(config); b++) {
             (void)hg_bank_start(&self->memory.bank[b], &config->bank[b], sum);
             sum = &sum[HG_BANK_SUMS(config->bank[b].certificates)];
         }
@@ -169,7 +215,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     if ((self == NULL) || (config == NULL) || (memory == NULL)) {
         return HG_E_ARGUMENT;
     }
-    if (!counts_valid(config)) {
+    if ((!counts_valid(config)) || (!parts_there(config))) {
         return HG_E_CONFIG;
     }
     if (!memory_there(config, memory)) {
@@ -202,7 +248,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
 
 static void reset_threshold(hg_detector *self, uint8_t g, hg_start how)
 {
-    if (self->config->hull != NULL) {
+    if (!by_zonotope(self->config)) {
         hg_hull_reset(&self->memory.hull[g], how);
     } else {
         hg_zonotope_reset(&self->memory.zonotope[g], how);
@@ -279,14 +325,14 @@ static void derive(hg_detector *self, uint8_t doubt)
 {
     const hg_detector_config *config = self->config;
     uint8_t place = config->signals;
-    for (uint8_t i = 0U; i < config->predictors; i++) {
+    for (uint8_t i = 0U; i < predictors_of(config); i++) {
         const hg_predict_config *predict = &config->predict[i];
         /* An age beyond every horizon ends the prediction. */
         const uint8_t age = inputs_certain(config, predict, doubt) ? hg_hold_age(&self->memory.hold[predict->group]) : UINT8_MAX;
         hg_predict_step(&self->memory.predict[i], age, self->value, self->radius, &self->value[place], &self->radius[place]);
         place += predict->width;
     }
-    if (config->mismatch != NULL) {
+    if (with_mismatch(config)) {
         hg_mismatch_step(config->mismatch, self->value, self->radius, &self->radius[place]); /* their values stay 0 */
     }
 }
@@ -294,7 +340,7 @@ static void derive(hg_detector *self, uint8_t doubt)
 /* By how much a radius has grown, from above and finite. */
 static hg_real difference(hg_real now, hg_real before)
 {
-    return hg_real_min(hg_real_mul(now - before, WIDER), HG_REAL_MAX);
+    return hg_real_min(hg_real_widen(hg_real_sub(now, before), WIDER), HG_REAL_MAX);
 }
 
 /* The radii of one group at a past sample turn out wider, and with them what was derived from them. */
@@ -308,7 +354,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
         increase[g] = row[g];
     }
     hg_hold_past(&self->memory.hold[group], lag, &row[first]);
-    for (uint8_t i = 0U; i < config->predictors; i++) {
+    for (uint8_t i = 0U; i < predictors_of(config); i++) {
         const hg_predict_config *predict = &config->predict[i];
         /* Where the prediction was the tighter one it still is; the held one's wider radius holds for either. */
         for (uint8_t g = 0U; (predict->group == group) && (g < predict->width); g++) {
@@ -319,13 +365,13 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
     for (uint8_t g = 0U; g < place; g++) {
         increase[g] = difference(row[g], increase[g]);
     }
-    if (config->mismatch != NULL) {
+    if (with_mismatch(config)) {
         hg_mismatch_grow(config->mismatch, increase, &row[place]);
         for (uint8_t g = place; g < config->width; g++) {
             increase[g] = difference(row[g], increase[g]);
         }
     }
-    for (uint8_t g = 0U; (config->zonotope != NULL) && (g < config->generators); g++) {
+    for (uint8_t g = 0U; by_zonotope(config) && (g < config->generators); g++) {
         hg_zonotope_widen(&self->memory.zonotope[g], lag, 0U, config->width, increase);
     }
 }
@@ -368,7 +414,7 @@ static void refuse(hg_detector *self)
 /* Threshold of one generator; has it settled since its start? */
 static bool step_threshold(hg_detector *self, uint8_t g, hg_real *J)
 {
-    if (self->config->hull != NULL) {
+    if (!by_zonotope(self->config)) {
         hg_hull_step(&self->memory.hull[g], &self->radii, J);
         return hg_hull_ready(&self->memory.hull[g]);
     }
@@ -409,9 +455,9 @@ static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
 static hg_status step_banks(hg_detector *self, hg_evidence *evidence)
 {
     const hg_detector_config *config = self->config;
-    const hg_status kept = (config->banks > 0U) ? hg_ring_push(&self->values, self->value) : HG_OK;
+    const hg_status kept = (banks_of(config) > 0U) ? hg_ring_push(&self->values, self->value) : HG_OK;
     hg_status status = HG_OK;
-    for (uint8_t b = 0U; b < config->banks; b++) {
+    for (uint8_t b = 0U; b < banks_of(config); b++) {
         const uint16_t place = (uint16_t)((config->residuals - config->banks) + b);
         hg_bank *bank = &self->memory.bank[b];
         hg_status judged = kept;

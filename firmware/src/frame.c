@@ -40,7 +40,7 @@ static bool field_valid(const hg_message *message, const hg_field *field)
     const bool is_signed = (field->flags & HG_FIELD_SIGNED) != 0U;
     const bool is_float = (field->flags & HG_FIELD_FLOAT32) != 0U;
     bool valid = (field->length >= 1U) && (field->length <= ((is_signed || is_float) ? 32U : 31U));
-    valid = valid && ((!is_float) || (field->length == FLOAT32_BITS));
+    valid = valid && ((!is_float) || ((field->length == FLOAT32_BITS) && (HG_REAL_Q31 == 0)));
     for (uint8_t i = 0U; valid && (i < field->length); i++) {
         const uint16_t bit = position(field, i);
         valid = (bit < (8U * (uint16_t)message->length)) && (!hg_e2e_owns(message->e2e, bit));
@@ -87,16 +87,49 @@ static uint32_t invalid_pattern(const hg_field *field)
     return pattern;
 }
 
+#if HG_REAL_Q31
+/* No field is a float: hg_frame_valid() refuses it. */
+static uint32_t pattern_of_float(const hg_code_scale *scale, int32_t code)
+{
+    (void)scale;
+    (void)code;
+    return FLOAT32_QUIET_NAN;
+}
+
+static int32_t code_of_float(const hg_code_scale *scale, uint32_t pattern)
+{
+    (void)scale;
+    (void)pattern;
+    return HG_CODE_INVALID;
+}
+#else
+static uint32_t pattern_of_float(const hg_code_scale *scale, int32_t code)
+{
+    const float value = (float)hg_code_value(scale, code);
+    uint32_t pattern;
+    /* deviation: misra-c2012-21.15: copying the bytes is the defined way from a float to its pattern */
+    /* cppcheck-suppress misra-c2012-21.15 */
+    (void)memcpy(&pattern, &value, sizeof(pattern));
+    return pattern;
+}
+
+static int32_t code_of_float(const hg_code_scale *scale, uint32_t pattern)
+{
+    float value;
+    /* deviation: misra-c2012-21.15: as above, the other way */
+    /* cppcheck-suppress misra-c2012-21.15 */
+    (void)memcpy(&value, &pattern, sizeof(value));
+    return hg_code_encode(scale, (hg_real)value);
+}
+#endif
+
 static uint32_t pattern_of(const hg_field *field, const hg_code_scale *scale, int32_t code)
 {
     uint32_t pattern = (uint32_t)code & mask_of(field);
     if (!hg_code_valid(scale, code)) {
         pattern = invalid_pattern(field);
     } else if ((field->flags & HG_FIELD_FLOAT32) != 0U) {
-        const float value = (float)hg_code_value(scale, code);
-        /* deviation: misra-c2012-21.15: copying the bytes is the defined way from a float to its pattern */
-        /* cppcheck-suppress misra-c2012-21.15 */
-        (void)memcpy(&pattern, &value, sizeof(pattern));
+        pattern = pattern_of_float(scale, code);
     } else {
         /* an integer field is the code itself */
     }
@@ -107,11 +140,7 @@ static int32_t code_of(const hg_field *field, const hg_code_scale *scale, uint32
 {
     int32_t code;
     if ((field->flags & HG_FIELD_FLOAT32) != 0U) {
-        float value;
-        /* deviation: misra-c2012-21.15: as above, the other way */
-        /* cppcheck-suppress misra-c2012-21.15 */
-        (void)memcpy(&value, &pattern, sizeof(value));
-        code = hg_code_encode(scale, (hg_real)value);
+        code = code_of_float(scale, pattern);
     } else {
         const bool negative = ((field->flags & HG_FIELD_SIGNED) != 0U) && ((pattern >> (field->length - 1U)) != 0U);
         const uint32_t extended = negative ? (pattern | ~mask_of(field)) : pattern;

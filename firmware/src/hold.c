@@ -112,7 +112,7 @@ static hg_real between(const hg_hold *self, uint8_t g, bool *conditional)
     const hg_hold_config *config = self->config;
     hg_real radius = slew(config, self->age, g);
     if ((!self->lost) && (self->age > silence(self))) {
-        const hg_real promised = hg_real_mul(config->scale[g].resolution, (hg_real)threshold(self, g)) + config->half[g];
+        const hg_real promised = hg_real_add(hg_real_of_code(config->scale[g].resolution, config->scale[g].exponent, threshold(self, g)), config->half[g]);
         if (promised < radius) {
             radius = promised;
             *conditional = true;

@@ -23,7 +23,7 @@ void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, c
 bool hg_linalg_fits(const hg_matrix *m, const hg_matrix *n, uint8_t rows, uint8_t m_cols, uint8_t n_cols)
 {
     const bool shapes = (m->rows == rows) && (n->rows == rows) && (m->cols == m_cols) && (n->cols == n_cols);
-    return shapes && (m->exponent == n->exponent) && (m->data != NULL) && (n->data != NULL);
+    return shapes && (m->exponent == n->exponent) && hg_exponent_valid(m->exponent) && (m->data != NULL) && (n->data != NULL);
 }
 
 bool hg_linalg_finite(const hg_real *x, uint16_t n)

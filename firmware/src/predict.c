@@ -7,7 +7,8 @@ bool hg_predict_valid(const hg_predict_config *config, uint8_t signals)
     bool valid = (config->order >= 1U) && (config->width >= 1U) && (config->inputs >= 1U) && (config->horizon >= 1U) &&
                  (config->horizon < UINT8_MAX) && (config->input != NULL) && (config->known != NULL) && (config->fresh != NULL) &&
                  (config->radius != NULL) && (((uint16_t)config->first + config->width) <= signals);
-    valid = valid && (config->correct.rows == config->order) && (config->correct.cols == config->width) && (config->correct.data != NULL);
+    valid = valid && (config->correct.rows == config->order) && (config->correct.cols == config->width) && (config->correct.data != NULL) &&
+            hg_exponent_valid(config->correct.exponent);
     valid = valid && hg_linalg_fits(&config->state, &config->drive, config->order, config->order, config->inputs);
     valid = valid && hg_linalg_fits(&config->output, &config->direct, config->width, config->order, config->inputs);
     for (uint8_t i = 0U; valid && (i < config->inputs); i++) {
@@ -44,14 +45,14 @@ static void correct(hg_predict *self, const hg_real *value)
 {
     const hg_predict_config *config = self->config;
     for (uint8_t g = 0U; g < config->width; g++) {
-        self->y[g] = value[config->first + g] - self->y[g];
+        self->y[g] = hg_real_sub(value[config->first + g], self->y[g]);
     }
     for (uint8_t i = 0U; i < config->order; i++) {
         hg_acc sum = hg_acc_zero();
         for (uint8_t g = 0U; g < config->width; g++) {
             sum = hg_acc_mac(sum, config->correct.data[((uint16_t)i * config->width) + g], self->y[g]);
         }
-        self->x[i] += hg_acc_real(sum, config->correct.exponent);
+        self->x[i] = hg_real_add(self->x[i], hg_acc_real(sum, config->correct.exponent));
     }
 }
 

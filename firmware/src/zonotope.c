@@ -1,5 +1,7 @@
 #include "hullguard/zonotope.h"
 
+#if HG_WITH_ZONOTOPE
+
 #include <stddef.h>
 
 /* Columns there can be before a reduction. */
@@ -407,3 +409,5 @@ bool hg_zonotope_ready(const hg_zonotope *self)
     const uint16_t needed = (self->how == HG_START_REST) ? self->config->ready_rest : self->config->ready_moving;
     return (self->lost == 0U) && (self->k >= needed);
 }
+
+#endif

@@ -30,7 +30,7 @@ class _Parser(argparse.ArgumentParser):
 def _common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", metavar="MODEL", help="name of a shipped model, or path of a model file")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the model, e.g. groups.measurement.trigger.silence=1")
-    parser.add_argument("--real", choices=["f32", "f64"], default="f32", help="number type of the C library (default f32)")
+    parser.add_argument("--real", choices=["f32", "f64", "q31"], default="f32", help="number type of the C library (default f32)")
     _output(parser)
 
 

@@ -6,7 +6,7 @@ COVERED  := $(LIB_SRC) $(MODEL_SRC) $(HOST_HAL_SRC)
 REPORT   := $(GCOVR) --root . --filter 'firmware/src/' --filter 'firmware/include/'
 
 .PHONY: coverage
-coverage: $(REALS:%=$(COVERAGE)/%/ran) ## line and branch coverage of the library by the unit tests; fails below 100 %
+coverage: $(FLOATS:%=$(COVERAGE)/%/ran) ## line and branch coverage of the library by the unit tests; fails below 100 %
 	@$(REPORT) --json $(COVERAGE)/all.json $(COVERAGE)
 	@$(REPORT) --add-tracefile $(COVERAGE)/all.json --txt-metric branch --txt
 	@$(REPORT) --add-tracefile $(COVERAGE)/all.json --fail-under-line 100 --fail-under-branch 100 --txt
@@ -21,4 +21,4 @@ $(COVERAGE)/$(1)/ran: $(UNIT_TESTS:%=$(COVERAGE)/$(1)/%)
 	@for test in $$^; do $$$$test >$$$$test.log 2>&1 || { cat $$$$test.log; echo "FAILED $$$$test"; exit 1; }; done
 	@touch $$@
 endef
-$(foreach r,$(REALS),$(eval $(call coverage_variant,$(r))))
+$(foreach r,$(FLOATS),$(eval $(call coverage_variant,$(r))))

@@ -24,6 +24,7 @@ typedef struct {                   /* flash: one a bank, generated */
     uint8_t        window;         /* samples, 1 .. 255 */
     uint8_t        width;          /* signals read, 1 .. 255 */
     const uint8_t *signal;         /* [width] their places in the rings' rows */
+    int8_t         exponent;       /* weight and extra_weight are the numbers below times 2^exponent; 0 for the float types */
     const hg_real *weight;         /* [window][width][certificates], lag 0 first */
     uint8_t        extras;         /* radii that are added besides, 0 .. 255 */
     const uint8_t *extra;          /* [extras] their places in the rows of the ring of radii */

@@ -11,15 +11,17 @@
 #define HG_CODE_INVALID INT32_MIN /* stands for a value that cannot be sent: out of range or not finite */
 
 typedef struct {           /* flash: one a signal, generated */
-    hg_real resolution;  /* signal units a code, > 0 */
+    hg_real resolution;  /* signal units a code, > 0; Q31: times 2^exponent */
     hg_real offset;      /* signal value of code 0 */
-    hg_real per_unit;    /* codes a signal unit: 1 / resolution */
+    hg_real per_unit;    /* codes a signal unit: 1 / resolution; Q31: 1 / (4 resolution) */
+    int8_t  exponent;    /* Q31: -40 .. 0; 0 for the float types */
     int32_t minimum;     /* smallest valid code, > INT32_MIN */
     int32_t maximum;     /* largest valid code */
 } hg_code_scale;
 
 /** Nearest code; HG_CODE_INVALID when the value is not finite or its code is outside minimum .. maximum.
- *  A tie goes away from zero. float32 moves the nearest code by at most 2^-22 |code|, which a model's half (hold.h) covers. */
+ *  A tie goes away from zero. float32 moves the nearest code by at most 2^-22 |code|, Q31 by at most 2^-30 |code| and what a step of the value
+ *  is in codes; a model's half (hold.h) covers it. */
 int32_t hg_code_encode(const hg_code_scale *scale, hg_real value);
 
 /** Signal value of a valid code. */

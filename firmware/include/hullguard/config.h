@@ -8,15 +8,36 @@
 #include HG_CONFIG_HEADER
 #endif
 
-/* Number type of every signal, radius and table: exactly one of the two is 1. float32 is the default; float64 is for host studies. */
+/* Number type of every signal, radius and table: exactly one of the three is 1. float32 is the default; float64 is for host studies;
+   Q31 is fixed point for cores without an FPU (real.h). */
 #ifndef HG_REAL_F64
 #define HG_REAL_F64 0
 #endif
-#ifndef HG_REAL_F32
-#define HG_REAL_F32 (1 - HG_REAL_F64)
+#ifndef HG_REAL_Q31
+#define HG_REAL_Q31 0
 #endif
-#if (HG_REAL_F32 + HG_REAL_F64) != 1
-#error "choose exactly one number type: HG_REAL_F32 or HG_REAL_F64"
+#ifndef HG_REAL_F32
+#define HG_REAL_F32 (1 - HG_REAL_F64 - HG_REAL_Q31)
+#endif
+#if (HG_REAL_F32 + HG_REAL_F64 + HG_REAL_Q31) != 1
+#error "choose exactly one number type: HG_REAL_F32, HG_REAL_F64 or HG_REAL_Q31"
+#endif
+
+/* Parts of the detector that a model may do without: 0 leaves them out of the image, and a model that needs one is refused at its start. */
+#ifndef HG_WITH_ZONOTOPE
+#define HG_WITH_ZONOTOPE (1 - HG_REAL_Q31) /* its columns have no range that could be proven in fixed point */
+#endif
+#ifndef HG_WITH_BANK
+#define HG_WITH_BANK 1
+#endif
+#ifndef HG_WITH_PREDICT
+#define HG_WITH_PREDICT 1
+#endif
+#ifndef HG_WITH_MISMATCH
+#define HG_WITH_MISMATCH 1
+#endif
+#if HG_REAL_Q31 && HG_WITH_ZONOTOPE
+#error "the zonotope is for the float types: a model for HG_REAL_Q31 has its threshold by the hull"
 #endif
 
 /* Senders of one model, the closing one included. The verdict frame has two bits of bus health for each: at most 8. */

@@ -33,7 +33,7 @@
 
 #define HG_FIELD_MOTOROLA 0x01U /* big-endian: start is the most significant bit, as in a DBC */
 #define HG_FIELD_SIGNED 0x02U   /* two's complement */
-#define HG_FIELD_FLOAT32 0x04U  /* IEEE 754, 32 bits: the code's value in signal units */
+#define HG_FIELD_FLOAT32 0x04U  /* IEEE 754, 32 bits: the code's value in signal units; not with Q31 */
 
 typedef struct {          /* flash: one a signal in a frame */
     uint16_t start;       /* DBC start bit: least significant bit (Intel) or most significant bit (Motorola) */

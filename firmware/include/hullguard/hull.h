@@ -2,11 +2,13 @@
  *  The threshold: the exact interval hull of what a residual can be without a fault (methods, platoon, section 6). For a linear generator
  *  it is a sum of absolute impulse responses over the radii of its signals,
  *
- *      J_i(k) = bias_i(k) + sum over lags j < taps of |h_i(j)| radius(k - j) + tail_i(k)
+ *      J_i(k) = bias_i(k) + sum over signals g, lags j < taps_g of |h_ig(j)| radius_g(k - j) + theta_i(k)
+ *      theta_i(k) = decay_i theta_i(k-1) + sum over g of tail_gi radius_g(k - taps_g)
  *
- *  bias: initial state (two tables: started at rest, or in a moving plant), disturbances and all rounding; offline, its last row holds for good.
- *  tail: what lies behind the taps, from above:  theta(k) = decay theta(k-1) + sum_g tail_input_g radius_g(k - taps), tail_i = tail_output_i theta;
- *  it heals as fast as the generator forgets and never keeps a maximum. All tables are rounded so that J is never below the exact hull.
+ *  bias: disturbances, all rounding, and the initial state (started at rest, or in a moving plant); a table, then what holds for good.
+ *  theta: what lies behind the taps, from above: tail_gi decay_i^j >= |h_ig(taps_g + j)| for all j, and from sample `settle` on likewise what is
+ *  left of the initial state. A signal that is nearly always known exactly needs few taps. theta heals as fast as the generator forgets and
+ *  never keeps a maximum. All tables are rounded so that J is never below the exact hull.
  *  One ring of past radii serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
  *  because J is linear in the radii. Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_HULL_H
@@ -22,17 +24,20 @@
 typedef struct {                 /* flash: one a generator, generated */
     uint8_t        residuals;    /* 1 .. 255 */
     uint8_t        width;        /* signals read, 1 .. 255 */
+    int8_t         exponent;     /* weight and tail are the numbers below times 2^exponent; 0 for the float types */
     const uint8_t *signal;       /* [width] their places in the ring's rows */
-    uint8_t        taps;         /* 1 .. ring length - 1 */
-    const hg_real *weight;       /* [taps][residuals][width] >= 0, lag 0 first */
-    uint16_t       settle;       /* rows of the bias tables, >= 1 */
-    const hg_real *rest;         /* [settle][residuals] bias after a start within the initial range */
-    const hg_real *moving;       /* [settle][residuals] bias after a start anywhere in the state range */
+    const uint8_t *taps;         /* [width] 1 .. ring length - 1 */
+    const hg_real *weight;       /* >= 0: residuals 0 and 1, then 2 and 3, .., of each two (the last may be alone) signal after signal [taps][2 or 1] */
+    uint16_t       settle;       /* rows of the bias tables, 0 .. UINT16_MAX - 1 */
+    const hg_real *rest;         /* [settle][residuals] bias after a start within the initial range, then */
+    const hg_real *rest_left;    /* [residuals] what theta begins with */
+    const hg_real *moving;       /* [settle][residuals] bias after a start anywhere in the state range, then */
+    const hg_real *moving_left;  /* [residuals] what theta begins with */
+    const hg_real *bias;         /* [residuals] bias from sample settle on */
     uint16_t       ready_rest;   /* samples until the initial state is a small part of J, after a start at rest */
     uint16_t       ready_moving; /* the same after a start in a moving plant */
-    hg_real        decay;        /* 0 .. < 1 */
-    const hg_real *tail_input;   /* [width] >= 0 */
-    const hg_real *tail_output;  /* [residuals] >= 0 */
+    const hg_real *decay;        /* [residuals] 0 .. < 1 */
+    const hg_real *tail;         /* [residuals][width] >= 0 */
 } hg_hull_config;
 
 /* How the plant may move when a detector starts. The careful choice is the one that zeroed memory holds. */
@@ -43,26 +48,30 @@ typedef enum {
 
 typedef struct {                 /* RAM: one a generator */
     const hg_hull_config *config;
-    hg_real               theta;
+    hg_real              *theta; /* [residuals] */
     uint16_t              k;     /* samples since the start, saturated */
     hg_start              how;
 } hg_hull;
 
-/** Are sizes and tables within the ranges above, for a ring of this width and length? Cost: width comparisons. */
+/** Memory of one hull, numbers. */
+#define HG_HULL_REALS(residuals) ((uint32_t)(residuals))
+
+/** Are sizes and tables within the ranges above, for a ring of this width and length? Cost: width + residuals comparisons. */
 bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length);
 
 /** Begin at the sample after this call.
+ *  @param[in] memory  [HG_HULL_REALS(residuals)], owned by the caller
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
  *  @retval HG_E_CONFIG    hg_hull_valid() says no */
-hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_ring *ring, hg_start how);
+hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_ring *ring, hg_start how, hg_real *memory);
 
 /** Begin again. */
 void hg_hull_reset(hg_hull *self, hg_start how);
 
 /** Threshold of this sample, whose radii are the newest row of the ring.
- *  @param[out] J  [residuals] > 0
- *  Cost: taps x residuals x width multiplications. */
+ *  @param[out] J  [residuals] > 0; HG_REAL_MAX where it is larger
+ *  Cost: residuals x (sum of taps + width + 1) multiplications. */
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J);
 
 /** Has the initial state become a small part of J? */

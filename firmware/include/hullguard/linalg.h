@@ -9,7 +9,7 @@
 typedef struct {
     uint8_t        rows;
     uint8_t        cols;
-    int8_t         exponent; /* the matrix is data * 2^exponent */
+    int8_t         exponent; /* the matrix is data * 2^exponent; hg_exponent_valid() */
     const hg_real *data;     /* rows x cols, row-major */
 } hg_matrix;
 
@@ -22,7 +22,7 @@ typedef struct {
  *  Summed in index order, first m then n, so that every target rounds alike. Cost: rows (m.cols + n.cols) multiplications. */
 void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, const hg_real *y, hg_real *out);
 
-/** Do m and n fit hg_linalg_apply(): same rows and exponent, these dimensions, both tables present? Constant time. */
+/** Do m and n fit hg_linalg_apply(): same rows and valid exponent, these dimensions, both tables present? Constant time. */
 bool hg_linalg_fits(const hg_matrix *m, const hg_matrix *n, uint8_t rows, uint8_t m_cols, uint8_t n_cols);
 
 /** Are all n numbers finite? Cost: n comparisons. */

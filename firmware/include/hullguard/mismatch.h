@@ -17,6 +17,7 @@
 typedef struct {              /* flash: one a model, generated */
     uint8_t        states;    /* derived signals, 0 .. 255 */
     uint8_t        width;     /* signals read, 0 .. 255 */
+    int8_t         exponent;  /* gain is the numbers below times 2^exponent; 0 for the float types */
     const uint8_t *signal;    /* [width] their places in the signal vector */
     const hg_real *constant;  /* [states] >= 0 */
     const hg_real *gain;      /* [states][width] >= 0 */

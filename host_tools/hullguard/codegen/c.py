@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from hullguard.codegen.both import Both, Scaled, both
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
@@ -32,7 +34,13 @@ def real(x: float) -> str:
     mantissa, exponent = x.hex().split("p")
     if "." in mantissa:
         mantissa = mantissa.rstrip("0").rstrip(".")
-    return f"HG_REAL_C({mantissa}p{exponent})"
+    literal = f"{mantissa}p{exponent}"
+    return f"HG_REAL_T({literal}, {x.fixed})" if isinstance(x, Both) else f"HG_REAL_C({literal})"
+
+
+def scaled(x: int) -> str:
+    """An exponent: only fixed point has any."""
+    return f"HG_EXPONENT({x.fixed})" if isinstance(x, Scaled) else str(x)
 
 
 def reals(row: Iterable[float]) -> list[str]:
@@ -143,6 +151,13 @@ def _limits(tables: Tables) -> list[str]:
     for macro, least in needed:
         if least > 1:  # config.h allows no less than 1
             lines += [f"#if {macro} < {least}U", f'#error "model {tables.name} needs {macro} of at least {least}"', "#endif"]
+    parts = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch))
+    for part, used in parts:
+        if used:
+            lines += [f"#if !HG_WITH_{part}", f'#error "model {tables.name} needs HG_WITH_{part}"', "#endif"]
+    if tables.fixed is None:
+        reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
+        lines += ["#if HG_REAL_Q31", f'#error "{reason}"', "#endif"]
     return [*lines, ""] if lines else []
 
 
@@ -200,6 +215,17 @@ def _kind(g: GroupTable, closes: bool) -> str:
     return "periodic" if g.periodic else "event"
 
 
+def _units(macro: str, tables: Tables) -> list[str]:
+    """What a program needs that has numbers of its own to convert."""
+    if tables.fixed is None:
+        return []
+    units = ", ".join(str(u) for u in tables.fixed.units[: tables.signals])
+    return [
+        *comment("Initialiser of the signals' units: with HG_REAL_Q31 a value or radius x is held as the integer x 2^(31 - unit), below 2^31."),
+        f"#define {macro} {{{units}}}",
+    ]
+
+
 def _header(design: Design, names: Names) -> str:
     tables, model = design.tables, design.model
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
@@ -233,6 +259,7 @@ def _header(design: Design, names: Names) -> str:
         "/* Initialisers of arrays of names, for programs that talk to people. */",
         *(_strings(f"{prefix}_SIGNAL_NAMES", names.signals) if signals else []),
         *_strings(f"{prefix}_GROUP_NAMES", names.groups),
+        *_units(f"{prefix}_UNITS", tables),
         *(_strings(f"{prefix}_FAULT_NAMES", names.faults) if names.faults else []),
         "",
         "/* Constants of the detector node. */",
@@ -267,7 +294,7 @@ def _distinct(model: str, names: Names) -> None:
 def _scale(s: SignalTable) -> list[str]:
     return [
         f"    {{.resolution = {real(s.resolution)}, .offset = {real(s.offset)}, .per_unit = {real(s.per_unit)},",
-        f"     .minimum = {s.minimum}, .maximum = {s.maximum}}}, /* {s.name} */",
+        f"     .exponent = {scaled(s.exponent)}, .minimum = {s.minimum}, .maximum = {s.maximum}}}, /* {s.name} */",
     ]
 
 
@@ -356,13 +383,14 @@ def _groups(tables: Tables, names: Names) -> list[str]:
     return [*lines, "};", ""]
 
 
-def _taps(g: GeneratorTable, n: str) -> list[str]:
-    shape = f"{n}_weight [{g.taps}][{len(g.output)}][{len(g.wide)}]"
-    lines = [*comment(f"{shape}: magnitude of the impulse response, residual units a signal unit, by lag, residual and signal")]
-    lines.append(f"static const hg_real {n}_weight[] = {{")
-    for lag, rows in enumerate(g.weight):
-        lines.append(f"    /* lag {lag} */")
-        lines += [line for row in rows for line in fill(reals(row))]
+def _taps(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
+    lines = table("uint8_t", f"{n}_taps", f"{len(g.taps)}", [unsigned(g.taps)], "lags that are summed one by one, by signal")
+    about = "magnitude of the impulse response, residual units a signal unit, by two residuals, signal and lag"
+    lines += [*comment(f"{n}_weight [{sum(g.taps) * len(g.output)}]: {about}"), f"static const hg_real {n}_weight[] = {{"]
+    for first, signal, block in g.blocks:
+        whose = f"residuals {first + 1} and {first + 2}" if len(block[0]) > 1 else f"residual {first + 1}"
+        lines.append(f"    /* {whose}, {signals[g.wide[signal]]} */")
+        lines += fill([x for row in block for x in reals(row)])
     return [*lines, "};", ""]
 
 
@@ -377,17 +405,19 @@ def _generator(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
         lines += table("hg_real", f"{n}_{part}", f"{order}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
     for part, cols, about in (("output", order, "residual from state"), ("direct", width, "residual from signals")):
         lines += table("hg_real", f"{n}_{part}", f"{residuals}][{cols}", [reals(r) for r in getattr(g, part)], f"{about}, row-major")
-    return lines + (_hull(g, n) if g.zonotope is None else _zonotope(g.zonotope, n, signals))
+    return lines + (_hull(g, n, signals) if g.zonotope is None else _zonotope(g.zonotope, n, signals))
 
 
-def _hull(g: GeneratorTable, n: str) -> list[str]:
+def _hull(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     residuals = len(g.output)
-    lines = _taps(g, n)
+    lines = _taps(g, n, signals)
     for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
         rows, about = [reals(r) for r in getattr(g, part)], f"threshold's part from initial state, disturbance and rounding, by sample {start}"
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
-    lines += table("hg_real", f"{n}_tail_input", f"{len(g.wide)}", [reals(g.tail_input)], "weight of a radius older than the taps")
-    return lines + table("hg_real", f"{n}_tail_output", f"{residuals}", [reals(g.tail_output)], "residual units a unit of the tail")
+        lines += table("hg_real", f"{n}_{part}_left", f"{residuals}", [reals(getattr(g, f"{part}_left"))], "what is left of the initial state then")
+    lines += table("hg_real", f"{n}_bias", f"{residuals}", [reals(g.bias)], "threshold's part from disturbance and rounding from then on")
+    lines += table("hg_real", f"{n}_decay", f"{residuals}", [reals(g.decay)], "by how much the part behind the taps shrinks in a sample")
+    return lines + table("hg_real", f"{n}_tail", f"{residuals}][{len(g.wide)}", [reals(r) for r in g.tail], "weight of a radius that leaves the taps, residual units a signal unit")
 
 
 REDUCTIONS = {TRUNCATE: "HG_REDUCTION_TRUNCATE", BOX: "HG_REDUCTION_BOX", BALL: "HG_REDUCTION_BALL"}
@@ -466,7 +496,8 @@ def _mismatch(m: MismatchTable | None, signals: Sequence[str]) -> list[str]:
     return [
         *lines,
         f"static const hg_mismatch_config mismatch = {{.states = {states}U, .width = {width}U, .signal = {present('mismatch_signal', m.signal)},",
-        f"                                            .constant = mismatch_constant, .gain = {present('mismatch_gain', m.signal)}}};",
+        f"                                            .constant = mismatch_constant, .gain = {present('mismatch_gain', m.signal)},",
+        f"                                            .exponent = {scaled(m.exponent)}}};",
         "",
     ]
 
@@ -501,7 +532,7 @@ def _banks(tables: Tables, signals: Sequence[str]) -> list[str]:
         lines += [
             f"    {{.certificates = {b.certificates}U, .window = {b.window}U, .width = {len(b.signal)}U, .signal = {n}_signal, .weight = {n}_weight,",
             f"     .extras = {len(b.extra)}U, .extra = {present(n + '_extra', b.extra)}, .extra_weight = {present(n + '_extra_weight', b.extra)},",
-            f"     .bias = {n}_bias, .widen = {real(b.widen)}}},",
+            f"     .bias = {n}_bias, .widen = {real(b.widen)}, .exponent = {scaled(b.exponent)}}},",
         ]
     return [*lines, "};", ""]
 
@@ -513,12 +544,13 @@ def _generators(tables: Tables) -> list[str]:
     lines = [*comment(f"residual [{count}]: the residual generators"), "static const hg_residual_config residual[] = {"]
     for i, g in enumerate(tables.generators):
         n, order, width, residuals = f"generator{i + 1}", len(g.state), len(g.signal), len(g.output)
+        moved, shown = scaled(g.exponents[0]), scaled(g.exponents[1])
         lines += [
             f"    {{.order = {order}U, .residuals = {residuals}U, .width = {width}U, .signal = {n}_signal,",
-            f"     .state = {{.rows = {order}U, .cols = {order}U, .exponent = 0, .data = {n}_state}},",
-            f"     .input = {{.rows = {order}U, .cols = {width}U, .exponent = 0, .data = {n}_input}},",
-            f"     .output = {{.rows = {residuals}U, .cols = {order}U, .exponent = 0, .data = {n}_output}},",
-            f"     .direct = {{.rows = {residuals}U, .cols = {width}U, .exponent = 0, .data = {n}_direct}}}},",
+            f"     .state = {{.rows = {order}U, .cols = {order}U, .exponent = {moved}, .data = {n}_state}},",
+            f"     .input = {{.rows = {order}U, .cols = {width}U, .exponent = {moved}, .data = {n}_input}},",
+            f"     .output = {{.rows = {residuals}U, .cols = {order}U, .exponent = {shown}, .data = {n}_output}},",
+            f"     .direct = {{.rows = {residuals}U, .cols = {width}U, .exponent = {shown}, .data = {n}_direct}}}},",
         ]
     lines += ["};", ""]
     if zonotopes(tables):
@@ -527,9 +559,10 @@ def _generators(tables: Tables) -> list[str]:
     for i, g in enumerate(tables.generators):
         n = f"generator{i + 1}"
         lines += [
-            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'}, .taps = {g.taps}U, .weight = {n}_weight,",
-            f"     .settle = {g.settle}U, .rest = {n}_rest, .moving = {n}_moving, .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U,",
-            f"     .decay = {real(g.decay)}, .tail_input = {n}_tail_input, .tail_output = {n}_tail_output}},",
+            f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .exponent = {scaled(g.exponents[2])}, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'},",
+            f"     .taps = {n}_taps, .weight = {n}_weight, .settle = {g.settle}U, .rest = {n}_rest, .rest_left = {n}_rest_left,",
+            f"     .moving = {n}_moving, .moving_left = {n}_moving_left, .bias = {n}_bias,",
+            f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay, .tail = {n}_tail}},",
         ]
     return [*lines, "};", ""]
 
@@ -657,4 +690,4 @@ def _source(design: Design, names: Names) -> str:
 def emit_c(design: Design) -> tuple[str, str]:
     """Text of NAME.h and NAME.c."""
     names = names_of(design)
-    return _header(design, names), _source(design, names)
+    return _header(design, names), _source(replace(design, tables=both(design.tables)), names)

@@ -13,6 +13,10 @@
 #define HGH_DISTURBANCES_MAX 192
 #define HGH_FAULTS_MAX 32
 
+/** A number of the host as the library's type; in fixed point in units of 2^unit, and its infinity for what does not fit. */
+hg_real hgh_real(double x, int32_t unit);
+double  hgh_number(hg_real x, int32_t unit); /* and back */
+
 typedef struct {
     uint64_t state;
 } hgh_random;
@@ -71,6 +75,7 @@ typedef struct {                        /* x+ = A x + B u + Ed d, y = C x + D u 
     const int32_t       *input;         /* [p] places of u */
     const int32_t       *as_sent;       /* [p] 1: the plant applies what the wire carries */
     const hg_code_scale *scale;         /* [p] the wire of each input */
+    const int32_t       *unit;          /* [p] of the library's numbers: 2^unit in fixed point, else 0 */
     double               sample_time_s;
 } hgh_plant_config;
 
@@ -117,6 +122,7 @@ typedef struct {
     int64_t                 burst;        /* samples within which a loss takes all further frames of its group too; 0, 1: none */
     uint64_t                seed;
     int32_t                 start;        /* hg_start */
+    const int32_t          *unit;         /* [width + residuals] of the library's numbers: 2^unit in fixed point, else 0 */
 } hgh_run_config;
 
 typedef struct {

@@ -13,7 +13,7 @@ import cffi
 
 from hullguard.errors import InputError
 
-REALS = ("f32", "f64")
+REALS = ("f32", "f64", "q31")
 _BUILT = Path(__file__).resolve().parents[3] / "build" / "lib"
 
 

@@ -45,6 +45,10 @@ class Native:
     """The constant structures of one model, and the memory they lie in."""
 
     def __init__(self, library: Library, tables: Tables) -> None:
+        if library.real == "q31":
+            if tables.fixed is None:
+                raise InputError(tables.not_fixed)
+            tables = tables.fixed
         self.library, self.tables = library, tables
         self._keep: list[Any] = []
         ffi = library.ffi
@@ -76,7 +80,14 @@ class Native:
         return made
 
     def _reals(self, values: Any) -> Any:
-        return self._new("hg_real[]", [float(v) for v in np.ravel(np.array(values, dtype=float))] or [0.0])
+        return self._new("hg_real[]", [self._real(float(v)) for v in np.ravel(np.array(values, dtype=float))] or [0])
+
+    def _real(self, x: float) -> float | int:
+        return min(round(x * 2**31), 2**31 - 1) if self.library.real == "q31" else x
+
+    def unit(self, place: int) -> float:
+        """What a number of the signal vector, or behind it of the residuals, is times of, when hg_real holds 1; in fixed point 2^31."""
+        return 2.0 ** (self.tables.units[place] - 31) if self.tables.units else 1.0
 
     def _ints(self, kind: str, values: Any) -> Any:
         return self._new(f"{kind}[]", [int(v) for row in values for v in (row if isinstance(row, tuple) else (row,))] or [0])
@@ -99,8 +110,8 @@ class Native:
         fields, scales = self._new("hg_field[]", len(signals) or 1), self._new("hg_code_scale[]", len(signals) or 1)
         for i, s in enumerate(signals):
             fields[i].start, fields[i].length, fields[i].flags = s.start, s.length, s.flags
-            scales[i].resolution, scales[i].offset, scales[i].per_unit = s.resolution, s.offset, s.per_unit
-            scales[i].minimum, scales[i].maximum = s.minimum, s.maximum
+            scales[i].resolution, scales[i].offset, scales[i].per_unit = self._real(s.resolution), self._real(s.offset), self._real(s.per_unit)
+            scales[i].minimum, scales[i].maximum, scales[i].exponent = s.minimum, s.maximum, s.exponent
         m.field, m.scale = fields, scales
         self.scales.append(scales)
 
@@ -109,8 +120,8 @@ class Native:
         h.half, h.span = self._reals([s.half for s in g.signals]), self._reals([s.span for s in g.signals])
         h.middle, h.slew = self._reals([s.middle for s in g.signals]), self._reals(g.slew)
 
-    def _matrix(self, m: Any, table: tuple[tuple[float, ...], ...]) -> None:
-        m.rows, m.cols, m.exponent, m.data = len(table), len(table[0]), 0, self._reals(table)
+    def _matrix(self, m: Any, table: tuple[tuple[float, ...], ...], exponent: int = 0) -> None:
+        m.rows, m.cols, m.exponent, m.data = len(table), len(table[0]), exponent, self._reals(table)
 
     def _detector(self, holds: Any) -> Any:
         t = self.tables
@@ -152,7 +163,7 @@ class Native:
         if t.mismatch is not None:
             m = self._new("hg_mismatch_config *")
             m.states, m.width, m.signal = len(t.mismatch.constant), len(t.mismatch.signal), self._ints("uint8_t", t.mismatch.signal)
-            m.constant, m.gain = self._reals(t.mismatch.constant), self._reals(t.mismatch.gain)
+            m.constant, m.gain, m.exponent = self._reals(t.mismatch.constant), self._reals(t.mismatch.gain), t.mismatch.exponent
             d.mismatch = m
 
     def _banks(self, d: Any) -> None:
@@ -160,21 +171,25 @@ class Native:
         banks = self._new("hg_bank_config[]", len(t.banks) or 1)
         for b, table in zip(banks, t.banks, strict=False):
             b.certificates, b.window, b.width = table.certificates, table.window, len(table.signal)
-            b.signal, b.weight, b.bias, b.widen = self._ints("uint8_t", table.signal), self._reals(table.weight), self._reals(table.bias), table.widen
+            b.signal, b.weight, b.bias, b.widen = self._ints("uint8_t", table.signal), self._reals(table.weight), self._reals(table.bias), self._real(table.widen)
+            b.exponent = table.exponent
             b.extras, b.extra = len(table.extra), self._ints("uint8_t", table.extra)
             b.extra_weight = self._reals(table.extra_weight)
         d.banks, d.bank = len(t.banks), banks
 
     def _generator(self, r: Any, g: GeneratorTable) -> None:
         r.order, r.residuals, r.width, r.signal = len(g.state), len(g.output), len(g.signal), self._ints("uint8_t", g.signal)
-        for place, table in ((r.state, g.state), (r.input, g.input), (r.output, g.output), (r.direct, g.direct)):
-            self._matrix(place, table)
+        moved, shown, _ = g.exponents
+        for place, table, exponent in ((r.state, g.state, moved), (r.input, g.input, moved), (r.output, g.output, shown), (r.direct, g.direct, shown)):
+            self._matrix(place, table, exponent)
 
     def _hull(self, h: Any, g: GeneratorTable) -> None:
-        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), self._ints("uint8_t", g.wide), g.taps
-        h.weight, h.settle, h.rest, h.moving = self._reals(g.weight), g.settle, self._reals(g.rest), self._reals(g.moving)
-        h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, g.decay
-        h.tail_input, h.tail_output = self._reals(g.tail_input), self._reals(g.tail_output)
+        h.exponent = g.exponents[2]
+        h.residuals, h.width, h.signal, h.taps = len(g.output), len(g.wide), self._ints("uint8_t", g.wide), self._ints("uint8_t", g.taps)
+        h.weight = self._reals([x for _, _, block in g.blocks for row in block for x in row])
+        h.settle, h.rest, h.moving = g.settle, self._reals(g.rest), self._reals(g.moving)
+        h.rest_left, h.moving_left, h.bias = self._reals(g.rest_left), self._reals(g.moving_left), self._reals(g.bias)
+        h.ready_rest, h.ready_moving, h.decay, h.tail = g.ready_rest, g.ready_moving, self._reals(g.decay), self._reals(g.tail)
 
 
 def frame_out(library: Library, frame: Any) -> Frame:
@@ -273,8 +288,8 @@ class Node:
         count = self._lib.hg_node_report(self.node, self._verdict, lockstep and self.node.due == 0, self._frames)
         return [frame_out(self.native.library, self._frames[i]) for i in range(count)]
 
-    def _numbers(self, pointer: Any, count: int) -> list[float]:
-        return list(self._ffi.unpack(pointer, count)) if count else []
+    def _numbers(self, pointer: Any, count: int, first: int = 0) -> list[float]:
+        return [x * self.native.unit(first + i) for i, x in enumerate(self._ffi.unpack(pointer, count))] if count else []
 
     @property
     def value(self) -> list[float]:
@@ -289,12 +304,12 @@ class Node:
     @property
     def r(self) -> list[float]:
         """Residuals of the last step, generators one after another."""
-        return self._numbers(self.node.detector.r, self.native.tables.residuals)
+        return self._numbers(self.node.detector.r, self.native.tables.residuals, self.native.tables.width)
 
     @property
     def J(self) -> list[float]:
         """Thresholds of the last step."""
-        return self._numbers(self.node.detector.J, self.native.tables.residuals)
+        return self._numbers(self.node.detector.J, self.native.tables.residuals, self.native.tables.width)
 
     def health(self) -> dict[str, int]:
         """Counters of all links together, by name, and of the node."""
@@ -338,7 +353,7 @@ class Sender:
         table = self.native.tables.groups[group]
         value = self._value[group]
         for i in range(len(table.signals)):
-            value[i] = reading[table.first + i]
+            value[i] = self._lib.hgh_real(reading[table.first + i], table.signals[i].unit)
         if self._lib.hg_sender_step(self._senders[group], k & 0xFFFFFFFF, value, self._frame) != self._lib.HG_OK:
             return None
         return frame_out(self.native.library, self._frame)
@@ -402,6 +417,7 @@ class PlantConfig:
             ffi.memmove(ffi.addressof(scale, row), ffi.addressof(native.scales[gi], g.signals.index(i)), ffi.sizeof("hg_code_scale"))
         self._keep.append(scale)
         c.scale, c.sample_time_s = scale, model.sample_time_s
+        c.unit = ints([native.tables.units[i] if native.tables.units else 0 for i in model.inputs])
         self.config = c
 
 
@@ -500,6 +516,8 @@ class Batch:
 
         c = ffi.new("hgh_run_config *")
         c.node, c.sender = native.node, native.senders
+        self._keep.append(ffi.new("int32_t[]", native.tables.units or [0] * (native.tables.width + native.tables.residuals)))
+        c.unit = self._keep[-1]
         if series is None:
             c.plant, c.plants = configs, len(made)
         else:

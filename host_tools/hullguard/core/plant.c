@@ -5,6 +5,31 @@
 
 #define TWO_PI 6.283185307179586
 
+#if HG_REAL_Q31
+hg_real hgh_real(double x, int32_t unit)
+{
+    const double steps = ldexp(x, 31 - unit);
+    return (fabs(steps) < (double)INT32_MAX) ? (hg_real)llround(steps) : (hg_real)((steps < 0.0) ? -INT32_MAX : INT32_MAX);
+}
+
+double hgh_number(hg_real x, int32_t unit)
+{
+    return ldexp((double)x, unit - 31);
+}
+#else
+hg_real hgh_real(double x, int32_t unit)
+{
+    (void)unit;
+    return (hg_real)x;
+}
+
+double hgh_number(hg_real x, int32_t unit)
+{
+    (void)unit;
+    return (double)x;
+}
+#endif
+
 static uint64_t mix(uint64_t z)
 {
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
@@ -140,10 +165,10 @@ static double command(hgh_plant *self, int32_t i)
             u -= c->gain[i * c->n + j] * (self->x[j] - c->equilibrium[j]);
         }
     }
-    const double low = (double)hg_code_value(&c->scale[i], c->scale[i].minimum);
-    const double high = (double)hg_code_value(&c->scale[i], c->scale[i].maximum);
+    const double low = hgh_number(hg_code_value(&c->scale[i], c->scale[i].minimum), c->unit[i]);
+    const double high = hgh_number(hg_code_value(&c->scale[i], c->scale[i].maximum), c->unit[i]);
     u = fmin(fmax(u, low), high);
-    return (c->as_sent[i] != 0) ? (double)hg_code_value(&c->scale[i], hg_code_encode(&c->scale[i], (hg_real)u)) : u;
+    return (c->as_sent[i] != 0) ? hgh_number(hg_code_value(&c->scale[i], hg_code_encode(&c->scale[i], hgh_real(u, c->unit[i]))), c->unit[i]) : u;
 }
 
 void hgh_plant_read(hgh_plant *self, const double *d, double *value)

@@ -207,7 +207,7 @@ static void speak(hgh_run *self, uint8_t group, const double *reading)
     hg_can_frame frame;
     const bool closing = group == self->config.node->closing;
     for (uint8_t g = 0U; g < self->config.sender[group].trigger->width; g++) {
-        value[g] = (hg_real)reading[g];
+        value[g] = hgh_real(reading[g], self->config.unit[(reading - self->reading) + g]);
     }
     if (hg_sender_step(&self->sender[group], (uint32_t)self->k, value, &frame) != HG_OK) {
         return;
@@ -329,27 +329,31 @@ const hgh_result *hgh_run_result(const hgh_run *self)
 static void promises(hgh_run *self)
 {
     double *promise = self->promise;
+    const int32_t *unit = self->config.unit;
     for (uint8_t g = 0U; g < self->config.node->detector->groups; g++) {
         const hg_trigger *t = &self->sender[g].trigger;
         const hg_code_scale *scale = self->config.sender[g].message->scale;
         const bool looked = t->age > t->config->silence[t->level];
         for (uint8_t i = 0U; i < t->config->width; i++) {
-            promise[i] = looked ? ((double)hg_trigger_threshold(t->config, t->level, i, t->sent[i]) + 0.5) * (double)scale[i].resolution : (double)INFINITY;
+            const double step = ldexp(hgh_number(scale[i].resolution, unit[i]), scale[i].exponent);
+            promise[i] = looked ? ((double)hg_trigger_threshold(t->config, t->level, i, t->sent[i]) + 0.5) * step : (double)INFINITY;
         }
         promise += t->config->width;
+        unit += t->config->width;
     }
 }
 
 hgh_view hgh_run_view(hgh_run *self)
 {
     const hg_detector *d = &self->node.detector;
+    const int32_t *unit = self->config.unit;
     for (uint8_t i = 0U; i < d->config->width; i++) {
-        self->value[i] = (double)d->value[i];
-        self->radius[i] = (double)d->radius[i];
+        self->value[i] = hgh_number(d->value[i], unit[i]);
+        self->radius[i] = hgh_number(d->radius[i], unit[i]);
     }
     for (uint16_t i = 0U; i < d->config->residuals; i++) {
-        self->r[i] = (double)d->r[i];
-        self->J[i] = (double)d->J[i];
+        self->r[i] = hgh_number(d->r[i], unit[d->config->width + i]);
+        self->J[i] = hgh_number(d->J[i], unit[d->config->width + i]);
     }
     promises(self);
     return (hgh_view){.reading = self->reading,

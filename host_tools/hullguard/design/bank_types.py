@@ -30,6 +30,7 @@ class BankTable:
     feeds: int  # mask of the groups whose signals carry weight
     extra: tuple[int, ...] = ()  # places of derived signals that have a radius only
     extra_weight: tuple[tuple[tuple[float, ...], ...], ...] = ()  # window x extra x certificates, rounded up
+    exponent: int = 0
 
     @property
     def certificates(self) -> int:

@@ -58,8 +58,8 @@ def _generator(name: str, g: GeneratorTable) -> Cost:
 
 def _hull(g: GeneratorTable) -> tuple[int, int, int]:
     residuals, width = len(g.output), len(g.wide)
-    taps = g.taps * residuals * width
-    return taps, taps + 2 * g.settle * residuals + width + residuals + 1, 0
+    taps = sum(g.taps) * residuals
+    return taps + (width + 1) * residuals, taps + (2 * g.settle + width + 4) * residuals, residuals
 
 
 def _zonotope(z: ZonotopeTable) -> tuple[int, int, int]:

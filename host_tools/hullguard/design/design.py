@@ -15,6 +15,7 @@ from hullguard.design.arith import digits, mul, row_sums, up32
 from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
+from hullguard.design.fixed import lower
 from hullguard.design.ids import ERRORS, POLYNOMIAL, SURE, undetected_patterns
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure, weighted
@@ -45,6 +46,7 @@ class Generator:
     observer: ObserverMatrices
     filter: PostFilter
     linear: hull.Linear
+    given: hull.Given
     tables: hull.HullTables
     zonotope: ZonotopeTable | None  # the threshold instead of the hull
     signal: tuple[int, ...]  # places of its signals
@@ -67,6 +69,7 @@ class Design:
     load_bound: float
     usual: Array  # radii of the whole vector most of the time
     uncertain: tuple[int, ...]  # states whose mismatch is a derived signal, the last ones of the vector
+    fixed_rounding: tuple[float, ...]  # residuals of generators, banks: the part of J that is rounding in fixed point; () where there is none
 
     @property
     def varying(self) -> Varying:
@@ -277,7 +280,17 @@ def finish(model: Model, stored: Stored) -> Design:
     checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
-    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states)
+    tables, lost = _fixed(model, generators, tables)
+    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states, lost)
+
+
+def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables) -> tuple[Tables, tuple[float, ...]]:
+    """The tables with those for fixed point, or with the reason why there are none; and what rounding costs there, in residual units."""
+    try:
+        made = lower(tables, tuple(g.linear for g in generators), tuple(g.given for g in generators), tuple(g.tables for g in generators), model.path.name)
+    except InputError as reason:
+        return replace(tables, not_fixed=str(reason)), ()
+    return replace(tables, fixed=made.tables), made.rounding
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:
@@ -307,7 +320,14 @@ class Derived:
     uncertain: tuple[int, ...]  # places of the uncertain states' radii
     states: tuple[int, ...]  # and the states
     usual: Array  # width: of the whole vector
+    late: Array  # width: one sample after a frame that did not come
     largest: Array  # uncertain states: radius at most
+
+
+def rewind_of(model: Model, place: int) -> int:
+    """Samples within which the radius of a signal may still be rewritten: of a derived one, whatever it is derived from."""
+    own = [g.trigger.interval_max for g in model.groups if place in g.signals or place >= len(model.signals)]
+    return max(own)
 
 
 def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> Derived:
@@ -322,13 +342,14 @@ def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> De
         # Between events a signal is as old as half its longest interval, when nothing is known of its motion.
         middle = p.radius[(groups[p.group].interval_max - 1) // 2]
         usual = np.concatenate([usual, np.minimum(usual[p.first : p.first + len(p.output)], middle)])
+    late = np.concatenate([g.slew[0] for g in groups] + [np.array(p.radius[0]) for p in predictors])
     if not uncertain(model):
-        return Derived(predictors, place, None, (), (), usual, np.zeros(0))
+        return Derived(predictors, place, None, (), (), usual, late, np.zeros(0))
     table, states = mismatch_table(model, stored.state_range)
     scale = np.array([s.scale for s in model.signals]) / 2  # what a signal usually is, as for its trigger
     own = np.array(table.constant) + mul(np.array(table.gain), (scale + usual_radius(model, stored.slew))[list(table.signal), None])[:, 0]
     places = tuple(range(len(usual), len(usual) + len(states)))
-    return Derived(predictors, place, table, places, states, np.concatenate([usual, own]), spread[list(states)])
+    return Derived(predictors, place, table, places, states, np.concatenate([usual, own]), np.concatenate([late, own]), spread[list(states)])
 
 
 def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Generator:
@@ -347,8 +368,9 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     ranges = hull.Ranges(np.abs(plant.equilibrium) + plant.initial_range, stored.state_range, values, values[len(outputs) :], derived.largest)
     signal = tuple(derived.place.get(k, k) for k in outputs + inputs)
     own = derived.usual[list(signal + derived.uncertain)]
-    longest = max(g.trigger.interval_max for g in model.groups)
-    table = hull.build(linear, T, sub, ranges, own, longest, f"{model.path.name}: detector.observers[{i}]", np.eye(plant.n)[:, list(derived.states)])
+    expected = hull.Expected(own, derived.late[list(signal + derived.uncertain)], tuple(rewind_of(model, k) for k in signal + derived.uncertain))
+    given = hull.Given(T, sub, ranges, expected, np.eye(plant.n)[:, list(derived.states)])
+    table = hull.build(linear, given, f"{model.path.name}: detector.observers[{i}]")
     ball = _zonotope(model, linear, T, sub, ranges, own, table, signal, derived, f"{model.path.name}: detector.observers[{i}]")
     paths = fault_paths(model, spec, spec.faults)
     blind = np.full(len(paths), np.inf)
@@ -359,7 +381,7 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
         except (np.linalg.LinAlgError, ValueError):
             pass  # without the event error the factorisation may not exist; then there is nothing to compare with
     delay = fault_delays(bounded, o, f, paths, radius[outputs + inputs], spec.search.size) if spec.filtered else np.full(len(paths), np.nan)
-    return Generator(spec, bounded, o, f, linear, table, ball, signal, own, found.smallest, found.first, delay, blind)
+    return Generator(spec, bounded, o, f, linear, given, table, ball, signal, own, found.smallest, found.first, delay, blind)
 
 
 def _zonotope(
@@ -390,7 +412,7 @@ def _feeds(model: Model, used: set[int]) -> int:
 
 def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorTable:
     wide = g.signal + derived.uncertain
-    used = {wide[i] for i in np.flatnonzero(np.any(g.tables.weight > 0, axis=(0, 1)) | (g.tables.tail_input > 0))}
+    used = {wide[i] for i in np.flatnonzero(np.any(g.tables.weight > 0, axis=(0, 1)) | np.any(g.tables.tail > 0, axis=0))}
     sent = {twin: place for place, twin in derived.place.items()}
     if used & set(derived.uncertain) and derived.mismatch is not None:
         used |= set(derived.mismatch.signal)
@@ -405,16 +427,18 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
         input=rows(g.linear.input),
         output=rows(g.linear.output),
         direct=rows(g.linear.direct),
-        taps=g.tables.weight.shape[0],
+        taps=g.tables.taps,
         weight=tuple(rows(w) for w in g.tables.weight),
-        settle=g.tables.rest.shape[0],
-        rest=rows(g.tables.rest),
-        moving=rows(g.tables.moving),
+        settle=g.tables.settle,
+        rest=rows(g.tables.rest[: g.tables.settle]),
+        rest_left=tuple(float(x) for x in g.tables.rest_left),
+        moving=rows(g.tables.moving[: g.tables.settle]),
+        moving_left=tuple(float(x) for x in g.tables.moving_left),
+        bias=tuple(float(x) for x in g.tables.bias),
         ready_rest=g.tables.ready_rest,
         ready_moving=g.tables.ready_moving,
-        decay=g.tables.decay,
-        tail_input=tuple(float(x) for x in g.tables.tail_input),
-        tail_output=tuple(float(x) for x in g.tables.tail_output),
+        decay=tuple(float(x) for x in g.tables.decay),
+        tail=rows(g.tables.tail),
         feeds=_feeds(model, {sent.get(i, i) for i in used}),
         faults=sum(1 << i for i, s in enumerate(size) if s < SEEN or predicted) | breaking(model),
         zonotope=g.zonotope,

@@ -24,7 +24,12 @@ TAPS_MAX = 200
 SMALLEST_DECAY = 1e-6  # of a generator that forgets all in finite time
 SETTLE_MAX = 2000
 LAGS_MAX = 400  # over which the growth of rounding is followed
-TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add
+TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add to them
+LATE_SHARE = 0.2  # the same when all radii are as wide as after a frame that did not come
+DECAYS = 40  # tried for a tail
+DOUBLE = 1 + 1e-9  # more than what double precision loses
+SLOWER = 1 - 1e-6  # a tail is made for a decay that much below the table's: rounding may take that much from it each sample
+START_SHARE = 0.1  # of the threshold: what the bound of what is left of the initial state may add to it
 BIAS_SHARE = 0.001  # of the threshold: what the last row of the bias tables may be above its limit
 READY_SHARE = 0.10  # of the threshold: what the initial state may still be when a detector is no longer starting
 
@@ -54,14 +59,18 @@ class Ranges:
 class HullTables:
     """What hg_hull_config holds; weights in the order of [y; u], then of the derived signals that have a radius only."""
 
-    weight: Array  # taps x residuals x width and derived
-    rest: Array  # settle x residuals
-    moving: Array  # settle x residuals
+    weight: Array  # most taps x residuals x width and derived; 0 behind a signal's taps
+    taps: tuple[int, ...]  # width and derived
+    rest: Array  # samples x residuals: bias after a start, its last row holds for good; the hull keeps the first `settle` of them
+    moving: Array  # samples x residuals
+    settle: int
+    rest_left: Array  # residuals: what the tail takes over of the initial state then
+    moving_left: Array  # residuals
+    bias: Array  # residuals: from then on
     ready_rest: int
     ready_moving: int
-    decay: float
-    tail_input: Array  # width and derived
-    tail_output: Array  # residuals
+    decay: Array  # residuals
+    tail: Array  # residuals x width and derived
     rounding: Array  # residuals: the part of the bias that is rounding
     steady: Array  # residuals: threshold at the expected radii
 
@@ -76,14 +85,25 @@ class Rounding:
     behind: Array  # residuals: what later lags can add for radii as wide as the ranges
 
 
-def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int) -> Rounding:
+@dataclass(frozen=True)
+class Fixed:
+    """Fixed-point arithmetic: what a step of each number is, signal units."""
+
+    state: Array  # order
+    residual: Array  # residuals
+    like: HullTables  # of the same generator in float32: same taps, decays and rows
+
+
+def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int, fixed: Fixed | None = None) -> Rounding:
     """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius.
+
+    In fixed point sums are exact, and each loses half a step of its number in the end.
 
     `more` (order x derived): how radii enter e that come with no value; nothing is rounded where they enter, only what they do to e later.
     """
     s, width = lin.input.shape
     m = plant.C.shape[0]
-    gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    gamma = 0.0 if fixed else (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
     x, u, v = ranges.state[:, None], ranges.input[:, None], ranges.value[:, None]
     widest = np.concatenate([2 * ranges.value, ranges.derived])[:, None]
     G, E, F, D = np.abs(lin.state), np.abs(lin.input), np.abs(lin.output), np.abs(lin.direct)
@@ -96,6 +116,9 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     into_r = mul(np.abs(mul(lin.output, T) + mul(Dy, plant.C)), x) + mul(np.abs(mul(Dy, plant.D) + Du), u)
     into_e += gamma * (mul(G, z) + mul(E, v))
     into_r += gamma * (mul(F, z) + mul(D, v))
+    if fixed:
+        into_e += fixed.state[:, None] / 2 * DOUBLE
+        into_r += fixed.residual[:, None] / 2 * DOUBLE
     # The part that does: |e(k)| <= sum over j of |G^j E| radius(k-1-j), and the value's own radius.
     none = np.zeros((s, more.shape[1]))
     into_z = np.array([np.abs(np.hstack([mul(p, lin.input), mul(p, more)])) for p in P])
@@ -151,69 +174,200 @@ def _rounded_tail(decay: float, into: Array, out: Callable[[int], Array]) -> Tai
     return Tail(kept, up32(digits(into * wider, 7)), lambda taps: digits(out(taps) * wider, 7))
 
 
-def _taps(share: Array, constant: Array, tail: Tail, radius: Array, least: int) -> int:
-    """Fewest taps behind which the bound of the tail is a small part of the threshold at the usual radii. `share`: lags x residuals."""
-    limit = TAIL_SHARE * (constant + share.sum(0))
-    bound = float(tail.input @ radius) / (1 - tail.decay)
-    for taps in range(least, TAPS_MAX):
-        if np.all(tail.output(taps) * bound <= limit):
-            return taps
-    return TAPS_MAX
+@dataclass(frozen=True)
+class Envelope:
+    """How impulse responses shrink, for every number of taps and several decays: |h_ig(taps + j)| <= cover decay_i^j for all j >= 0."""
+
+    decay: Array  # residuals x decays, as the tables will have them
+    cover: Array  # taps x residuals x signals x decays
+    behind: Array  # taps x residuals x signals: sum of |h_ig(j)|, j >= taps
+
+    def excess(self, taps: Array, radius: Array) -> Array:
+        """What the tail adds beyond the sum that it bounds, with these radii always (residuals x decays)."""
+        g = np.arange(len(taps))
+        cover, behind = self.cover[taps, :, g], self.behind[taps, :, g]
+        return np.asarray(((cover / (1 - self.decay) - behind[:, :, None]) * radius[:, None, None]).sum(0))
 
 
-def build(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, radius: Array, interval_max: int, where: str, derived: Array | None = None) -> HullTables:
-    """All tables of one generator. `radius` (width and derived) is what the radii usually are.
+def _decays(slowest: Tail, residuals: int) -> Array:
+    """What a tail may shrink by (residuals x decays)."""
+    return np.tile(up32(digits(slowest.decay + (1 - slowest.decay) * np.linspace(0.002, 0.9, DECAYS), 7)), (residuals, 1))
 
-    `derived` (n x derived signals): how derived signals that have a radius only disturb the state.
+
+def _envelope(weights: Array, slowest: Tail, most: int, kept: Array) -> Envelope:
+    """`weights` (lags x residuals x signals): all of |h| but what `slowest` bounds; `kept`: the decays."""
+    length = len(weights)
+    grid = kept[:, None, :] * SLOWER
+    if grid.min() < slowest.decay:
+        raise InputError("the generator decays too slowly for a threshold: choose poles further inside the unit circle")
+    cover = (slowest.output(length)[:, None] * slowest.input)[:, :, None] * np.ones(kept.shape[1])
+    behind = cover[:, :, 0] / (1 - slowest.decay)
+    covers, sums = np.zeros((most + 1, *cover.shape)), np.zeros((most + 1, *behind.shape))
+    for lag in range(length - 1, -1, -1):
+        cover = np.maximum(weights[lag][:, :, None], cover / grid)
+        behind = behind + weights[lag]
+        if lag <= most:
+            covers[lag], sums[lag] = cover, behind
+    return Envelope(kept, covers, sums)
+
+
+def _taps(envelope: Envelope, limits: tuple[tuple[Array, Array], ...], least: Array, most: int) -> Array:
+    """Few taps behind which no tail adds more than it may: `limits` are radii, and what may be added (residuals) with them.
+
+    From as many for each signal as are enough, one is taken where it hurts least, until none can be.
     """
+
+    def worst(taps: Array) -> float:
+        parts = [envelope.excess(taps, radius) / limit[:, None] for radius, limit in limits]
+        return float(np.max(parts, axis=0).min(1).max())
+
+    taps = next((t for n in range(1, most) if worst(t := np.maximum(least, n)) <= 1), np.full(len(least), most))
+    spare = set(range(len(taps)))
+    while spare:
+        costs = {}
+        for g in sorted(spare):
+            fewer = taps - (np.arange(len(taps)) == g)
+            costs[g] = worst(fewer) if fewer[g] >= least[g] else np.inf
+        spare = {g for g in spare if costs[g] <= 1}
+        if spare:
+            taps = taps - (np.arange(len(taps)) == min(spare, key=lambda g: costs[g]))
+    return taps
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the initial state adds to a threshold after a start (samples x residuals), and a bound for the sample after the last."""
+
+    added: Array
+    end: Array  # residuals
+
+    def later(self) -> Array:
+        """The most that it adds from each sample on."""
+        return np.asarray(np.maximum.accumulate(np.vstack([self.added, self.end])[::-1])[::-1])
+
+    def forgotten(self, driven: Array, limit: Array, steady: Array) -> int:
+        """The sample from which on the bias is nearly `limit`."""
+        later, last = self.later(), min(SETTLE_MAX, len(self.added) - 1)
+        return next((k for k in range(1, last) if np.all(later[k] + limit - driven[k] <= BIAS_SHARE * steady)), last)
+
+    def rows(self, driven: Array, limit: Array, last: int) -> Array:
+        """The bias, sample by sample; the last row holds for good."""
+        table = np.asarray(driven[: last + 1] + self.added[: last + 1])
+        table[last] = limit + self.later()[last]
+        return table
+
+    def left(self, driven: Array, limit: Array, decay: Array) -> Array:
+        """What a tail must begin with at each sample, if the bias is `limit` from there on (samples x residuals)."""
+        above = np.maximum(self.added + driven - limit, 0.0)
+        left = np.vstack([above, self.end])
+        for k in range(len(above) - 1, -1, -1):
+            left[k] = np.maximum(above[k], left[k + 1] / decay)
+        return left
+
+    def settled(self, driven: Array, limit: Array, steady: Array, decay: Array) -> int:
+        """From which sample on the tail that takes over adds little."""
+        left, above = self.left(driven, limit, decay), np.maximum(self.added + driven - limit, 0.0)
+        last = min(SETTLE_MAX, len(above) - 1)
+        for k in range(1, last):
+            tail = left[k] * decay ** np.arange(len(above) - k)[:, None]
+            if np.all(tail - above[k:] <= START_SHARE * (steady + above[k:])):
+                return k
+        return last
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Radii of a generator's signals (width and derived)."""
+
+    usual: Array  # most of the time
+    late: Array  # one sample after a frame that did not come
+    rewind: tuple[int, ...]  # samples within which one may still be rewritten
+
+
+def _start(lin: Linear, T: Array, F: Array, x: Array) -> Start:
+    """From anywhere in |x(0)| <= x."""
+    added = np.array([mul(np.abs(mul(f, T)), x[:, None])[:, 0] for f in F])
+    bound = _tail(lin, T)
+    return Start(added, bound.output(len(F) + 1) * float((bound.input * x).sum()))
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the tables of one generator follow from, besides its matrices."""
+
+    T: Array
+    plant: SubPlant
+    ranges: Ranges
+    expected: Expected
+    derived: Array  # n x derived signals: how those disturb the state that have a radius only
+
+
+def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> HullTables:
+    """All tables of one generator, rounded up to float32; for fixed point not yet rounded."""
+    T, plant, ranges, expected = given.T, given.plant, given.ranges, given.expected
     spectral = float(np.abs(np.linalg.eigvals(lin.state)).max())
     if spectral >= 1.0 - 1e-6:
         raise InputError(f"{where}: a pole of the fused observer has magnitude {spectral:.6f}; poles must be inside the unit circle")
     length = max(64, int(np.ceil(np.log(1e-12) / np.log(max(spectral, 0.05)))))
     if length > 20_000:
         raise InputError(f"{where}: a pole of magnitude {spectral:.6f} is too slow for a threshold; choose poles further inside the unit circle")
-    m = plant.C.shape[0]
+    m, radius = plant.C.shape[0], expected.usual
     F = powers(lin.output, lin.state, length)
-    more = mul(T, derived) if derived is not None else np.zeros((lin.state.shape[0], 0))
+    more = mul(T, given.derived)
     entering = np.hstack([lin.input, more])
     at_lag_0 = np.hstack([lin.direct, np.zeros((F.shape[1], more.shape[1]))])
-    weights = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
+    response = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
-    loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX))
+    loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX), fixed)
     lags = loss.weight.shape[0]
+    weights = response.copy()
     weights[:lags] += loss.weight
     steps = np.array([mul(np.abs(f), loss.into_e[:, None])[:, 0] for f in F])
     driven = (np.array([row_sums(np.abs(mul(f, Bd))) for f in F]) + steps).cumsum(0)
     at_once = row_sums(np.abs(Dd)) + loss.into_r
     rounding = steps.sum(0) + loss.into_r + loss.behind
-    initial = np.array([mul(np.abs(mul(f, T)), ranges.initial[:, None])[:, 0] for f in F])
-    moving = np.array([mul(np.abs(mul(f, T)), ranges.state[:, None])[:, 0] for f in F])
+    rest, moving = (_start(lin, T, F, x) for x in (ranges.initial, ranges.state))
 
     share = (weights * radius).sum(2)
+    most = min(TAPS_MAX, length)
+    slowest = _tail(lin, entering)
+    envelope = _envelope(response, slowest, most, fixed.like.decay[:, None] if fixed else _decays(slowest, F.shape[1]))
+    usual, late = driven[-1] + at_once + share.sum(0), driven[-1] + at_once + (weights * expected.late).sum((0, 2))
+    limits = (radius, TAIL_SHARE * usual), (expected.late, LATE_SHARE * late)
+    taps = np.array(fixed.like.taps) if fixed else _taps(envelope, limits, np.maximum(np.array(expected.rewind), 1), most)
+    chosen = np.max([envelope.excess(taps, r) / limit[:, None] for r, limit in limits], axis=0).argmin(1)
+    one = np.arange(len(chosen))
+    decay = envelope.decay[one, chosen]
     # What rounding adds to the lags behind the taps is no impulse response: it goes into the constant, with radii as wide as the ranges.
-    tail = _tail(lin, entering)
-    taps = _taps(share, driven[-1], tail, radius, max(interval_max, 2))
-    at_once = at_once + loss.behind + mul(loss.weight[taps:].sum(0), np.concatenate([2 * ranges.value, ranges.derived])[:, None])[:, 0]
-    driven = np.concatenate([np.zeros((1, F.shape[1])), driven]) + at_once
-    steady = driven[-1] + share.sum(0)
-    limit = driven[-1] * (1 + 1e-9)
-    later = np.maximum.accumulate(moving[::-1])[::-1]
-    settle = next((k for k in range(1, min(SETTLE_MAX, length - 1)) if np.all(later[k] + limit - driven[k] <= BIAS_SHARE * steady)), min(SETTLE_MAX, length - 1))
-    later_rest = np.maximum.accumulate(initial[::-1])[::-1]
-    rest_rows = driven[: settle + 1] + initial[: settle + 1]
-    moving_rows = driven[: settle + 1] + moving[: settle + 1]
-    rest_rows[settle], moving_rows[settle] = limit + later_rest[settle], limit + later[settle]
-    widen = 1 + (taps * weights.shape[2] + 16) * U32 * 1.01
+    widest = np.concatenate([2 * ranges.value, ranges.derived])
+    behind = np.array([loss.weight[t:, :, g].sum(0) for g, t in enumerate(taps)]).T
+    at_once = at_once + loss.behind + mul(behind, widest[:, None])[:, 0]
+    if fixed:  # a threshold rounds its sum, and a tail two products a sample
+        own = fixed.residual * (1 + 1 / (1 - decay))
+        at_once, rounding = at_once + own, rounding + own
+    limit = (driven[-1] + at_once) * (1 + 1e-9)
+    driven = np.concatenate([np.zeros((1, F.shape[1])), driven[:-1]]) + at_once
+    steady = limit + share.sum(0)
+    used = np.where(np.arange(taps.max())[:, None, None] < taps, weights[: taps.max()], 0.0)
+    widen = DOUBLE if fixed else 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
+    up: Callable[[Array], Array] = np.asarray if fixed else up32
+    slow = decay * SLOWER
+    last = moving.forgotten(driven, limit, steady)
+    settle = fixed.like.settle if fixed else max(start.settled(driven, limit, steady, slow) for start in (rest, moving))
     return HullTables(
-        weight=up32(weights[:taps] * widen),
-        rest=up32(rest_rows * widen),
-        moving=up32(moving_rows * widen),
-        ready_rest=_ready(initial, steady),
-        ready_moving=_ready(moving, steady),
-        decay=tail.decay,
-        tail_input=tail.input,
-        tail_output=up32(tail.output(taps) * widen),
+        weight=up(used * widen),
+        taps=tuple(int(t) for t in taps),
+        rest=up(rest.rows(driven, limit, last) * widen),
+        moving=up(moving.rows(driven, limit, last) * widen),
+        settle=settle,
+        rest_left=up(rest.left(driven, limit, slow)[settle] * widen),
+        moving_left=up(moving.left(driven, limit, slow)[settle] * widen),
+        bias=up(limit * widen),
+        ready_rest=_ready(rest.added, steady),
+        ready_moving=_ready(moving.added, steady),
+        decay=decay,
+        tail=up(digits(envelope.cover[taps, :, np.arange(len(taps))][:, one, chosen].T, 7) * (widen + 1e-6)),
         rounding=rounding,
         steady=steady,
     )

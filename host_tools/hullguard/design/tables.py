@@ -46,6 +46,8 @@ class SignalTable:
     span: float
     middle: float
     zero: int
+    exponent: int = 0  # of the resolution in fixed point
+    unit: int = 0  # its values and radii are these numbers times 2^unit
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,7 @@ class MismatchTable:
     signal: tuple[int, ...]
     constant: tuple[float, ...]
     gain: tuple[tuple[float, ...], ...]  # states x signals
+    exponent: int = 0
 
 
 @dataclass(frozen=True)
@@ -120,19 +123,28 @@ class GeneratorTable:
     input: tuple[tuple[float, ...], ...]
     output: tuple[tuple[float, ...], ...]
     direct: tuple[tuple[float, ...], ...]
-    taps: int
-    weight: tuple[tuple[tuple[float, ...], ...], ...]
+    taps: tuple[int, ...]  # of each of `wide`
+    weight: tuple[tuple[tuple[float, ...], ...], ...]  # by lag, residual and signal; 0 behind a signal's taps
     settle: int
     rest: tuple[tuple[float, ...], ...]
+    rest_left: tuple[float, ...]
     moving: tuple[tuple[float, ...], ...]
+    moving_left: tuple[float, ...]
+    bias: tuple[float, ...]
     ready_rest: int
     ready_moving: int
-    decay: float
-    tail_input: tuple[float, ...]
-    tail_output: tuple[float, ...]
+    decay: tuple[float, ...]
+    tail: tuple[tuple[float, ...], ...]  # residuals x wide
     feeds: int
     faults: int
     zonotope: ZonotopeTable | None = None  # the threshold instead of the hull
+    exponents: tuple[int, int, int] = (0, 0, 0)  # of state and input, of output and direct, of weight and tail
+
+    @property
+    def blocks(self) -> list[tuple[int, int, list[list[float]]]]:
+        """The weights as they lie in memory: (first residual, signal, taps x 2 or 1) for each two residuals, signal after signal."""
+        pairs = [range(i, min(i + 2, len(self.output))) for i in range(0, len(self.output), 2)]
+        return [(pair[0], g, [[self.weight[lag][i][g] for i in pair] for lag in range(taps)]) for pair in pairs for g, taps in enumerate(self.taps)]
 
 
 @dataclass(frozen=True)
@@ -152,6 +164,10 @@ class Tables:
     predictors: tuple[PredictTable, ...] = ()
     mismatch: MismatchTable | None = None
     banks: tuple[BankTable, ...] = ()
+    fixed: Tables | None = None  # the same in fixed point, or
+    not_fixed: str = ""  # why there is none
+    units: tuple[int, ...] = ()  # of fixed point: numbers are times 2^unit; the signal vector, then the residuals
+    float_hash: int | None = None  # of fixed point: it is the same model
 
     @property
     def signals(self) -> int:
@@ -166,7 +182,7 @@ class Tables:
     @property
     def history(self) -> int:
         """Rows of the ring of radii."""
-        taps = [g.taps + 1 for g in self.generators if g.zonotope is None]
+        taps = [max(g.taps) + 1 for g in self.generators if g.zonotope is None]
         rewinds = [g.interval_max + 1 for g in self.groups] if any(g.zonotope is not None for g in self.generators) else []
         return max(taps + rewinds + [b.window for b in self.banks])
 
@@ -194,7 +210,7 @@ class Tables:
     def reals(self) -> int:
         """hg_detector_reals(), evaluated here so that the generated storage has exactly that length."""
         own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
-        own += sum(g.zonotope.reals for g in self.generators if g.zonotope is not None)
+        own += sum(len(g.output) if g.zonotope is None else g.zonotope.reals for g in self.generators)
         own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
         return 3 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
 
@@ -206,7 +222,9 @@ class Tables:
     @property
     def hash(self) -> int:
         """32 bits that change with any number above: host and node compare them."""
-        text = json.dumps(_plain(self), sort_keys=True, separators=(",", ":"))
+        if self.float_hash is not None:
+            return self.float_hash
+        text = json.dumps(_plain(replace(self, fixed=None, not_fixed="")), sort_keys=True, separators=(",", ":"))
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
 
 

@@ -413,11 +413,11 @@ def _response_figure(g: Generator, names: list[str]) -> Figure:
 
 
 def _response_caption(g: Generator) -> str:
-    taps = g.tables.weight.shape[0]
+    taps, decays = g.tables.weight.shape[0], ", ".join(num(float(d)) for d in g.tables.decay)
     active = int(np.sum(g.tables.weight.max((0, 1)) > 0))
     left = active - min(active, SIGNALS_MAX)
     more = f" {plural(left, 'signal')} with smaller weights not drawn." if left else ""
-    return f"Weights of the threshold: what a radius j samples ago adds to J; {taps} taps, behind them a tail that shrinks by {num(g.tables.decay)} a sample.{more}"
+    return f"Weights of the threshold: what a radius j samples ago adds to J; {taps} taps at most, behind them tails that shrink by {decays} a sample.{more}"
 
 
 def _bias_figure(g: Generator) -> Figure:
