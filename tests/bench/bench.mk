@@ -8,7 +8,7 @@ bench-speed: lib ## plant samples per second and core in a campaign, of every sh
 	@$(PY) tests/bench/bench.py
 
 BENCH       := $(BUILD)/bench
-BENCH_REALS := f32
+BENCH_REALS := f32 q31
 MODELS      := $(patsubst firmware/models/%.c,%,$(MODEL_SRC))
 RECORDER    := tests/bench/record.py
 
@@ -26,6 +26,8 @@ SET_zonotope    := detector.threshold=zonotope
 SOURCE_derived  := platoon
 SET_derived     := detector.prediction=true plant.drag_per_s={value=1.0,pm=0.1}
 BENCH_MODELS    := $(MODELS) $(VARIANTS)
+NOT_q31         := $(VARIANTS)# neither zonotope nor prediction has a fixed-point form
+bench_models    = $(filter-out $(NOT_$(1)),$(BENCH_MODELS))
 bench_source    = $(or $(SOURCE_$(1)),$(1))
 bench_tables    = $(if $(SOURCE_$(1)),$(BENCH)/tables/$(1)/$(SOURCE_$(1)).c,firmware/models/$(1).c)
 bench_words     = $(foreach w,$(SET_$(1)),'$(w)')
@@ -70,7 +72,7 @@ $(eval $(call objects,$(BENCH)/$(1)-$(2),$(LIB_SRC) $(IMAGE_SRC) $(BENCH_CONSOLE
 $(eval $(call objects,$(BENCH)/$(1)-$(2),tests/target/console_libc.c,$$(call bench_hosted,$(1))))
 $(eval $(call assembly,$(BENCH)/$(1)-$(2),$(filter %.S,$(START_$(1))),$$(call bench_cc,$(1),$(2))))
 $(BENCH)/$(1)-$(2)/hal/start/memory.o: FREESTANDING += -fno-tree-loop-distribute-patterns
-$(foreach m,$(BENCH_MODELS),$(eval $(call bench_drive,$(1),$(2),$(m))))
+$(foreach m,$(call bench_models,$(2)),$(eval $(call bench_drive,$(1),$(2),$(m))))
 endef
 
 # $(call bench_drive,TARGET,REAL,MODEL)
@@ -90,5 +92,12 @@ bench-step-$(1)-$(3)-$(2): $(BENCH)/$(1)-$(2)/$(3)/drive.elf $(BENCH)/count.so
 endef
 $(foreach r,$(BENCH_REALS),$(foreach t,$(TARGETS) x86_64,$(eval $(call bench_target,$(t),$(r)))))
 
-bench-instructions: $(foreach t,$(BENCH_TARGETS),$(foreach m,$(BENCH_MODELS),$(BENCH)/$(t)-$(REAL)/$(m)/drive.elf)) $(BENCH)/count.so ## instructions of every part, on every target with numbers REAL (f32)
-	@$(PY) tests/bench/instructions.py $(if $(FORMAT),--format $(FORMAT)) --real $(REAL) $(foreach t,$(BENCH_TARGETS),'$(t)=$(CROSS_$(t))=$(RUN_$(t))')
+bench-instructions: $(BENCH_REALS:%=bench-instructions-%) ## instructions of every part, on every target, number type after number type
+
+# $(call bench_table,REAL)
+define bench_table
+.PHONY: bench-instructions-$(1)
+bench-instructions-$(1): $(foreach t,$(BENCH_TARGETS),$(foreach m,$(call bench_models,$(1)),$(BENCH)/$(t)-$(1)/$(m)/drive.elf)) $(BENCH)/count.so
+	@$(PY) tests/bench/instructions.py $(if $(FORMAT),--format $(FORMAT)) --real $(1) --models '$(call bench_models,$(1))' $(foreach t,$(BENCH_TARGETS),'$(t)=$(CROSS_$(t))=$(RUN_$(t))')
+endef
+$(foreach r,$(BENCH_REALS),$(eval $(call bench_table,$(r))))

@@ -2,7 +2,7 @@
 
 KNOWN   := cortex_m4f
 KNOWN_F := $(BENCH)/$(KNOWN)-f32
-PAINTED := cortex_m0 cortex_m4f rv32imac rv32imafc
+PAINTED := cortex_m4f rv32imac
 
 .PHONY: bench-test
 TEST_PARTS += bench-test

@@ -59,10 +59,10 @@ def _residual(g: GeneratorTable) -> Need:
 
 
 def _hull(g: GeneratorTable) -> Need:
-    """The taps; the tail behind them, which takes in one row and has one state; the bias."""
-    residuals, width = len(g.output), len(g.wide)
-    taps = g.taps * residuals * width
-    return Need(taps + g.taps * width + 2 * width + 2 * residuals + 2, taps + width + residuals + 1)
+    """The taps; behind them a tail for every residual, which takes in a row and has one state; the bias."""
+    residuals, width, taps = len(g.output), len(g.wide), sum(g.taps)
+    entries = (taps + width + 1) * residuals
+    return Need(entries + taps + width + 2 * residuals, entries)
 
 
 def _bank(b: BankTable) -> Need:
