@@ -22,6 +22,7 @@ from hullguard.model import load_model
 BENCH = Path("build/bench")
 KNOWN = BENCH / "cortex_m4f-f32/known.elf"
 PAINTED = [tuple(words.strip().split("=", 2)) for words in os.environ["BENCH_PAINTED"].split(";") if words.strip()]
+REP = ("hg_node_start",)  # holds an instruction that repeats itself, once more as a piece of its own
 SIZE = Size("cortex_m0-f32", "platoon", "node", 1000, 2000, 300, 400, ("hg_node_step",))
 
 
@@ -58,6 +59,15 @@ def test_the_same_count_as_callgrind(tmp_path: Path) -> None:
         subprocess.run(["valgrind", "--tool=callgrind", f"--toggle-collect={name}", f"--callgrind-out-file={out}", str(drive)], check=True, capture_output=True)
         totals = next(line for line in out.read_text(encoding="utf-8").splitlines() if line.startswith(("totals:", "summary:")))
         assert sum(c.all for c in found(calls, name)) == int(totals.split()[1]), name
+
+
+def test_the_same_count_instruction_by_instruction() -> None:
+    """Where the emulator translates every instruction alone, nothing hangs on how it cuts a program into pieces."""
+    drive = BENCH / "x86_64-f32/platoon/drive.elf"
+    whole, single = (count(drive, "", emulator, BENCH / "count.so")[1] for emulator in ("qemu-x86_64", "qemu-x86_64 -singlestep"))
+    assert [(c.function.name, c.all, c.self) for o in whole for c in o.walk() if c.function.name not in REP] == [
+        (c.function.name, c.all, c.self) for o in single for c in o.walk() if c.function.name not in REP
+    ]
 
 
 def test_the_tree_of_calls() -> None:
