@@ -10,11 +10,6 @@ int32_t hg_code_encode(const hg_code_scale *scale, hg_real value)
     return code;
 }
 
-hg_real hg_code_value(const hg_code_scale *scale, int32_t code)
-{
-    return hg_real_add(scale->offset, hg_real_of_code(scale->resolution, scale->exponent, code));
-}
-
 bool hg_code_valid(const hg_code_scale *scale, int32_t code)
 {
     return (code >= scale->minimum) && (code <= scale->maximum);

@@ -34,7 +34,7 @@ static bool parts_there(const hg_detector_config *config)
 
 uint32_t hg_detector_reals(const hg_detector_config *config)
 {
-    uint32_t reals = (3U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals);
+    uint32_t reals = (2U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals);
     reals += HG_RING_REALS(config->width, config->history) + HG_RING_REALS(config->signals, config->window);
     for (uint8_t g = 0U; g < config->generators; g++) {
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
@@ -103,7 +103,7 @@ static bool derived_valid(const hg_detector_config *config)
     return valid && (width == config->width);
 }
 
-/* Samples within which a signal's radius may still be rewritten: interval_max of its group, or of any for a signal that is derived from several. */
+/* How far back a signal's radius may still be rewritten: less than interval_max of its group, or of any for a signal that is derived from several. */
 static uint8_t rewinds_of(const hg_detector_config *config, uint8_t place)
 {
     uint8_t longest = 0U;
@@ -114,7 +114,7 @@ static uint8_t rewinds_of(const hg_detector_config *config, uint8_t place)
         end += trigger->width;
         longest = ((own || (place >= config->signals)) && (trigger->interval_max > longest)) ? trigger->interval_max : longest;
     }
-    return longest;
+    return (longest > 0U) ? (uint8_t)(longest - 1U) : 0U;
 }
 
 /* A rewind must end inside the taps: what a tail has taken in cannot be corrected. */
@@ -134,7 +134,7 @@ static bool generator_valid(const hg_detector_config *config, uint8_t g)
     if (config->hull != NULL) {
         valid = (residual->residuals == config->hull[g].residuals) && rewinds_end(config, &config->hull[g]);
     } else {
-        valid = (residual->residuals == config->zonotope[g].residuals) && (rewinds_of(config, UINT8_MAX) < config->history); /* it needs the old radii of all that is rewritten */
+        valid = (residual->residuals == config->zonotope[g].residuals) && ((rewinds_of(config, UINT8_MAX) + 1U) < config->history); /* it needs the old radii of all that is rewritten */
     }
     valid = valid && (residual->signal != NULL);
     for (uint8_t i = 0U; valid && (i < residual->width); i++) {
@@ -166,7 +166,7 @@ static hg_status start_holds(hg_detector *self)
         if ((config->hold[i].trigger == NULL) || ((first + config->hold[i].trigger->width) > config->signals)) {
             return HG_E_CONFIG;
         }
-        status = hg_hold_start(&self->memory.hold[i], &config->hold[i], &self->memory.code[2U * first]);
+        status = hg_hold_start(&self->memory.hold[i], &config->hold[i], &self->memory.code[HG_HOLD_CODES(first)]);
         first += config->hold[i].trigger->width;
     }
     return (first == config->signals) ? status : HG_E_CONFIG;
@@ -178,6 +178,7 @@ static hg_status start_generators(hg_detector *self, hg_start how)
     const hg_detector_config *config = self->config;
     hg_real *memory = &self->past[config->width];
     hg_status status = hg_ring_start(&self->radii, config->width, config->history, memory);
+    self->radius = memory;
     memory = &memory[HG_RING_REALS(config->width, config->history)];
     for (uint8_t g = 0U; (status == HG_OK) && (g < config->generators); g++) {
         status = hg_residual_start(&self->memory.residual[g], &config->residual[g], memory);
@@ -221,7 +222,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     if (!memory_there(config, memory)) {
         return HG_E_ARGUMENT;
     }
-    if ((memory->codes < (2U * (uint16_t)config->signals)) || (memory->reals < hg_detector_reals(config)) ||
+    if ((memory->codes < HG_HOLD_CODES(config->signals)) || (memory->reals < hg_detector_reals(config)) ||
         (memory->sums < hg_detector_sums(config))) {
         return HG_E_SIZE;
     }
@@ -229,8 +230,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     self->memory = *memory;
     self->refusals = 0U;
     self->value = memory->real;
-    self->radius = &self->value[config->width];
-    self->r = &self->radius[config->width];
+    self->r = &self->value[config->width];
     self->J = &self->r[config->residuals];
     self->past = &self->J[config->residuals];
     for (uint32_t i = 0U; i < memory->reals; i++) {
@@ -350,7 +350,8 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
     hg_real *row = hg_ring_row(&self->radii, lag);
     hg_real *increase = self->past;
     uint8_t place = config->signals;
-    for (uint8_t g = 0U; g < config->width; g++) {
+    const bool followed = with_mismatch(config) || by_zonotope(config); /* a hull asks for no more than the new radii */
+    for (uint8_t g = 0U; followed && (g < config->width); g++) {
         increase[g] = row[g];
     }
     hg_hold_past(&self->memory.hold[group], lag, &row[first]);
@@ -362,7 +363,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
         }
         place += predict->width;
     }
-    for (uint8_t g = 0U; g < place; g++) {
+    for (uint8_t g = 0U; followed && (g < place); g++) {
         increase[g] = difference(row[g], increase[g]);
     }
     if (with_mismatch(config)) {
@@ -381,6 +382,7 @@ static void step_holds(hg_detector *self, hg_evidence *evidence)
 {
     uint8_t rewind[HG_GROUPS_MAX];
     uint8_t first = 0U;
+    self->radius = hg_ring_open(&self->radii);
     for (uint8_t i = 0U; i < self->config->groups; i++) {
         hg_hold *hold = &self->memory.hold[i];
         hg_hold_step(hold, &self->value[first], &self->radius[first], &rewind[i]);
@@ -392,11 +394,7 @@ static void step_holds(hg_detector *self, hg_evidence *evidence)
         }
         first += hold->config->trigger->width;
     }
-    for (uint8_t g = 0U; g < self->config->signals; g++) {
-        self->radius[g] = hg_real_min(self->radius[g], HG_REAL_MAX); /* NaN too: a row that the ring refuses would shift all others */
-    }
     derive(self, evidence->doubt);
-    (void)hg_ring_push(&self->radii, self->radius);
     first = 0U;
     for (uint8_t i = 0U; i < self->config->groups; i++) {
         for (uint8_t lag = 1U; (lag <= rewind[i]) && (lag < self->config->history); lag++) {

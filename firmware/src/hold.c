@@ -9,13 +9,26 @@ static uint8_t horizon(const hg_hold_config *config)
     return (uint8_t)(config->trigger->interval_max + config->margin);
 }
 
+/* A radius: what is not one here would be in every threshold. */
+static bool radii_valid(const hg_real *radius, uint16_t n)
+{
+    bool valid = true;
+    for (uint16_t i = 0U; i < n; i++) {
+        valid = valid && hg_real_finite(radius[i]) && (radius[i] >= HG_REAL_ZERO);
+    }
+    return valid;
+}
+
 static bool tables_valid(const hg_hold_config *config)
 {
     bool valid = (config->trigger != NULL) && hg_trigger_valid(config->trigger);
     valid = valid && (((uint16_t)config->trigger->interval_max + config->margin) < UINT8_MAX);
     if (valid && (config->trigger->width > 0U)) {
+        const uint8_t width = config->trigger->width;
         valid = (config->scale != NULL) && (config->half != NULL) && (config->slew != NULL) && (config->span != NULL) &&
                 (config->middle != NULL);
+        valid = valid && radii_valid(config->half, width) && radii_valid(config->span, width) &&
+                radii_valid(config->slew, (uint16_t)((uint16_t)horizon(config) * width));
     }
     return valid;
 }
@@ -32,6 +45,7 @@ hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *co
     self->config = config;
     self->sent = codes;
     self->previous = &codes[width];
+    self->promise = &codes[2U * (uint16_t)width];
     self->age = UINT8_MAX;
     self->good = 0U;
     self->level = 0U;
@@ -45,39 +59,12 @@ hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *co
     for (uint8_t g = 0U; g < width; g++) {
         self->sent[g] = HG_CODE_INVALID;
         self->previous[g] = HG_CODE_INVALID;
+        self->promise[g] = 0;
     }
     return HG_OK;
 }
 
-hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
-{
-    if (self->fresh) {
-        return HG_E_REPEATED;
-    }
-    const hg_trigger_config *trigger = self->config->trigger;
-    /* Silence beyond interval_max has set lost: the counter may have run round since, and its continuing proves nothing. */
-    const bool whole = continues && (!self->lost) && (self->good > 0U);
-    self->gap = self->doubt && (!whole);
-    self->gap_age = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
-    for (uint8_t g = 0U; g < trigger->width; g++) {
-        self->previous[g] = self->sent[g];
-        self->sent[g] = code[g];
-    }
-    self->recovering = self->seen && (!whole);
-    self->seen = true;
-    self->good = whole ? GOOD_IN_ROW : 1U;
-    self->level = whole ? hg_trigger_level(trigger, self->sent, self->previous) : 0U;
-    self->lost = false;
-    self->fresh = true;
-    return HG_OK;
-}
-
-void hg_hold_lose(hg_hold *self)
-{
-    self->lost = true;
-}
-
-/* Largest silent time and threshold that the sender may be using: its level's, or over all levels while that is not known. */
+/* Longest silent time and threshold that the sender may be using: its level's, or over all levels while that is not known. */
 static uint8_t silence(const hg_hold *self)
 {
     const hg_trigger_config *trigger = self->config->trigger;
@@ -101,24 +88,40 @@ static int32_t threshold(const hg_hold *self, uint8_t g)
     return widest;
 }
 
-static hg_real slew(const hg_hold_config *config, uint8_t age, uint8_t g)
+hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
 {
-    return config->slew[(((uint32_t)age - 1U) * config->trigger->width) + g];
+    if (self->fresh) {
+        return HG_E_REPEATED;
+    }
+    const hg_trigger_config *trigger = self->config->trigger;
+    /* Silence beyond interval_max has set lost: the counter may have run round since, and its continuing proves nothing. */
+    const bool whole = continues && (!self->lost) && (self->good > 0U);
+    self->gap = self->doubt && (!whole);
+    self->gap_age = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
+    for (uint8_t g = 0U; g < trigger->width; g++) {
+        self->previous[g] = self->sent[g];
+        self->sent[g] = code[g];
+    }
+    self->recovering = self->seen && (!whole);
+    self->seen = true;
+    self->good = whole ? GOOD_IN_ROW : 1U;
+    self->level = whole ? hg_trigger_level(trigger, self->sent, self->previous) : 0U;
+    for (uint8_t g = 0U; g < trigger->width; g++) {
+        self->promise[g] = threshold(self, g); /* until the next frame, or until one is known to be lost and nothing is promised */
+    }
+    self->lost = false;
+    self->fresh = true;
+    return HG_OK;
 }
 
-/* Radius of channel g between frames; sets *conditional where it relies on the sender's silence. */
-static hg_real between(const hg_hold *self, uint8_t g, bool *conditional)
+void hg_hold_lose(hg_hold *self)
 {
-    const hg_hold_config *config = self->config;
-    hg_real radius = slew(config, self->age, g);
-    if ((!self->lost) && (self->age > silence(self))) {
-        const hg_real promised = hg_real_add(hg_real_of_code(config->scale[g].resolution, config->scale[g].exponent, threshold(self, g)), config->half[g]);
-        if (promised < radius) {
-            radius = promised;
-            *conditional = true;
-        }
-    }
-    return radius;
+    self->lost = true;
+}
+
+static const hg_real *slew(const hg_hold_config *config, uint8_t age)
+{
+    return &config->slew[((uint32_t)age - 1U) * config->trigger->width];
 }
 
 void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewind)
@@ -140,16 +143,27 @@ void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewin
     if (self->lost) {
         self->good = 0U;
     }
-    for (uint8_t g = 0U; g < config->trigger->width; g++) {
-        const bool known = self->sent[g] != HG_CODE_INVALID;
-        value[g] = known ? hg_code_value(&config->scale[g], self->sent[g]) : config->middle[g];
-        if (stale || (!known)) {
-            radius[g] = config->span[g];
-        } else if (self->fresh) {
-            radius[g] = config->half[g];
-        } else {
-            radius[g] = between(self, g, &conditional);
+    /* Silence is weighed whether it is to be trusted or not: a sample costs the same with a frame and without. */
+    const bool held = (!stale) && (!self->fresh);
+    const bool trusted = held && (!self->lost) && (self->age > silence(self));
+    const bool silent = config->trigger->interval_max > 1U; /* ever */
+    const uint8_t width = config->trigger->width;
+    const hg_real *half = config->half;
+    const hg_real *moved = held ? slew(config, self->age) : half;
+    const hg_code_scale *scale = config->scale;
+    const int32_t *sent = self->sent;
+    const int32_t *promise = self->promise;
+    for (uint8_t g = 0U; g < width; g++) {
+        const bool known = sent[g] != HG_CODE_INVALID;
+        hg_real widest = (stale || (!known)) ? config->span[g] : moved[g];
+        value[g] = known ? hg_code_value(&scale[g], sent[g]) : config->middle[g];
+        if (silent) {
+            const hg_real promised = hg_real_add(hg_real_of_code(scale[g].resolution, scale[g].exponent, promise[g]), half[g]);
+            const bool tighter = trusted && known && (promised < widest);
+            conditional = conditional || tighter;
+            widest = tighter ? promised : widest;
         }
+        radius[g] = widest;
     }
     const bool newly_lost = was_in_doubt && self->lost && (!self->fresh);
     if (newly_lost) {
@@ -167,7 +181,7 @@ void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius)
     /* After a frame that revealed the loss, the value held in between is the one before it. */
     const int32_t *held = self->gap ? self->previous : self->sent;
     for (uint8_t g = 0U; g < config->trigger->width; g++) {
-        radius[g] = (held[g] == HG_CODE_INVALID) ? config->span[g] : slew(config, (uint8_t)(self->gap_age - lag), g);
+        radius[g] = (held[g] == HG_CODE_INVALID) ? config->span[g] : slew(config, (uint8_t)(self->gap_age - lag))[g];
     }
 }
 

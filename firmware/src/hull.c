@@ -6,7 +6,7 @@ static bool tables_there(const hg_hull_config *config)
 {
     return (config->signal != NULL) && (config->taps != NULL) && (config->weight != NULL) && (config->rest != NULL) &&
            (config->rest_left != NULL) && (config->moving != NULL) && (config->moving_left != NULL) && (config->bias != NULL) &&
-           (config->decay != NULL) && (config->tail != NULL);
+           (config->decay != NULL);
 }
 
 bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length)
@@ -14,7 +14,7 @@ bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t rin
     bool valid = (config->residuals >= 1U) && (config->width >= 1U) && (config->settle >= 1U) && (config->settle < UINT16_MAX) &&
                  hg_exponent_valid(config->exponent) && tables_there(config);
     for (uint8_t g = 0U; valid && (g < config->width); g++) {
-        valid = (config->signal[g] < ring_width) && (config->taps[g] >= 1U) && (config->taps[g] < ring_length);
+        valid = (config->signal[g] < ring_width) && (config->taps[g] < ring_length);
     }
     for (uint8_t i = 0U; valid && (i < config->residuals); i++) {
         valid = (config->decay[i] >= HG_REAL_ZERO) && (config->decay[i] < HG_REAL_C(1.0));
@@ -45,77 +45,52 @@ void hg_hull_reset(hg_hull *self, hg_start how)
     self->how = how;
 }
 
-/* Numbers from the newest sample of the ring's first signal back to the one of a signal `lag` samples ago, wrapped around. */
-static uint16_t place_of(const hg_ring *ring, uint8_t lag)
-{
-    const uint16_t row = (ring->newest >= lag) ? (uint16_t)(ring->newest - lag) : (uint16_t)((ring->newest + ring->length) - lag);
-    return (uint16_t)(row * ring->width);
-}
-
-/* The bound on all lags behind the taps moves on by one sample. */
-static void tail_step(hg_hull *self, const hg_ring *ring)
-{
-    const hg_hull_config *config = self->config;
-    const hg_real *tail = config->tail;
-    for (uint8_t i = 0U; i < config->residuals; i++) {
-        hg_acc sum = hg_acc_zero();
-        for (uint8_t g = 0U; g < config->width; g++) {
-            sum = hg_acc_mac(sum, *tail, ring->data[place_of(ring, config->taps[g]) + config->signal[g]]);
-            tail++;
-        }
-        const hg_real kept = hg_real_mul(config->decay[i], self->theta[i]);
-        /* Held finite: an infinite theta would never heal. */
-        self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(sum, config->exponent)), HG_REAL_MAX);
-    }
-}
-
-/* Two residuals share what is read of the radii: a third of all that a threshold costs. */
+/* Sums for two residuals, which share what is read of the radii, or for one. */
 typedef struct {
-    const hg_real *weight; /* what is still to be used */
-    hg_acc         first;
-    hg_acc         second;
+    hg_acc first;
+    hg_acc second;
 } hg_pair;
 
-/* `lags` samples from place `at` of the ring backwards. */
-static void add_pair(hg_pair *pair, const hg_ring *ring, uint16_t at, uint8_t lags)
+/* One radius, with weights that follow one another. Returns the next of them. */
+static inline const hg_real *add_radius(hg_pair *sum, const hg_real *weight, hg_real radius, bool two)
 {
-    const hg_real *weight = pair->weight;
-    hg_acc first = pair->first;
-    hg_acc second = pair->second;
-    for (uint8_t left = lags; left > 0U; left--) {
-        const hg_real radius = ring->data[at];
-        first = hg_acc_mac(first, weight[0], radius);
-        second = hg_acc_mac(second, weight[1], radius);
-        weight = &weight[2];
-        at = (uint16_t)(at - ring->width); /* wraps below 0 after the last one, which is not read then */
-    }
-    pair->weight = weight;
-    pair->first = first;
-    pair->second = second;
-}
-
-static void add_one(hg_pair *pair, const hg_ring *ring, uint16_t at, uint8_t lags)
-{
-    for (uint8_t left = lags; left > 0U; left--) {
-        pair->first = hg_acc_mac(pair->first, *pair->weight, ring->data[at]);
-        pair->weight = &pair->weight[1];
-        at = (uint16_t)(at - ring->width);
-    }
-}
-
-/* All taps of one signal; `two` residuals or one. The ring may wrap in between. */
-static void add_signal(hg_pair *pair, const hg_ring *ring, uint8_t signal, uint8_t taps, bool two)
-{
-    const uint8_t here = (taps <= ring->newest) ? taps : (uint8_t)(ring->newest + 1U);
-    const uint16_t newest = (uint16_t)((ring->newest * ring->width) + signal);
-    const uint16_t last = (uint16_t)(((ring->length - 1U) * ring->width) + signal);
+    sum->first = hg_acc_mac(sum->first, weight[0], radius);
     if (two) {
-        add_pair(pair, ring, newest, here);
-        add_pair(pair, ring, last, (uint8_t)(taps - here));
-    } else {
-        add_one(pair, ring, newest, here);
-        add_one(pair, ring, last, (uint8_t)(taps - here));
+        sum->second = hg_acc_mac(sum->second, weight[1], radius);
     }
+    return two ? &weight[2] : &weight[1];
+}
+
+/* `lags` radii, one a sample, back from this one on. */
+static inline const hg_real *add_lags(hg_pair *sum, const hg_real *weight, const hg_real *newest, uint8_t lags, uint8_t stride, bool two)
+{
+    const uint32_t end = (uint32_t)lags * stride;
+    hg_pair own = *sum;
+    for (uint32_t back = 0U; back < end; back += stride) {
+        weight = add_radius(&own, weight, *(newest - back), two);
+    }
+    *sum = own;
+    return weight;
+}
+
+/* All taps of one signal, then the radius that leaves them, which goes to the tail. `two` is a constant where this is called. */
+static inline const hg_real *add_signal(hg_pair *sum, hg_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal, uint8_t taps, bool two)
+{
+    const uint8_t stride = ring->width;
+    const uint8_t rows = (uint8_t)(ring->newest + 1U); /* from the newest back to where the ring wraps */
+    const hg_real *newest = &ring->data[((uint16_t)ring->newest * stride) + signal];
+    const hg_real *leaving;
+    if (taps < rows) {
+        weight = add_lags(sum, weight, newest, taps, stride, two);
+        leaving = newest - ((uint16_t)taps * stride);
+    } else {
+        const hg_real *last = &ring->data[((uint16_t)(ring->length - 1U) * stride) + signal];
+        const uint8_t behind = (uint8_t)(taps - rows);
+        weight = add_lags(sum, weight, newest, rows, stride, two);
+        weight = add_lags(sum, weight, last, behind, stride, two);
+        leaving = last - ((uint16_t)behind * stride);
+    }
+    return add_radius(tail, weight, *leaving, two);
 }
 
 /* What the initial state and the disturbances add at this sample; what is left of the initial state goes over into theta. */
@@ -137,24 +112,43 @@ static const hg_real *bias_step(hg_hull *self)
     return bias;
 }
 
+/* The bound on all lags behind the taps moves on by one sample. */
+static hg_real move_tail(hg_hull *self, uint8_t i, hg_acc leaving)
+{
+    const hg_real kept = hg_real_mul(self->config->decay[i], self->theta[i]);
+    /* Held finite: an infinite theta would never heal. */
+    self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(leaving, self->config->exponent)), HG_REAL_MAX);
+    return self->theta[i];
+}
+
+static hg_real whole(const hg_hull *self, hg_acc sum, hg_real bias, hg_real theta)
+{
+    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(sum, self->config->exponent)), theta), HG_REAL_MAX);
+}
+
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
 {
     const hg_hull_config *config = self->config;
-    hg_pair pair = {.weight = config->weight, .first = hg_acc_zero(), .second = hg_acc_zero()};
-    tail_step(self, ring);
+    const hg_real *weight = config->weight;
     const hg_real *bias = bias_step(self);
-    for (uint8_t i = 0U; i < config->residuals; i += 2U) {
-        const bool two = (uint8_t)(i + 1U) < config->residuals;
-        pair.first = hg_acc_zero();
-        pair.second = hg_acc_zero();
+    uint8_t i = 0U;
+    while ((uint8_t)(i + 1U) < config->residuals) {
+        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_pair tail = sum;
         for (uint8_t g = 0U; g < config->width; g++) {
-            add_signal(&pair, ring, config->signal[g], config->taps[g], two);
+            weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], true);
         }
-        const hg_real sum[2] = {hg_acc_real(pair.first, config->exponent), hg_acc_real(pair.second, config->exponent)};
-        for (uint8_t n = 0U; n < (two ? 2U : 1U); n++) {
-            const hg_real whole = hg_real_add(hg_real_add(bias[i + n], sum[n]), self->theta[i + n]);
-            J[i + n] = hg_real_min(whole, HG_REAL_MAX);
+        J[i] = whole(self, sum.first, bias[i], move_tail(self, i, tail.first));
+        J[i + 1U] = whole(self, sum.second, bias[i + 1U], move_tail(self, (uint8_t)(i + 1U), tail.second));
+        i += 2U;
+    }
+    if (i < config->residuals) {
+        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_pair tail = sum;
+        for (uint8_t g = 0U; g < config->width; g++) {
+            weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], false);
         }
+        J[i] = whole(self, sum.first, bias[i], move_tail(self, i, tail.first));
     }
     self->k = (self->k < UINT16_MAX) ? (uint16_t)(self->k + 1U) : UINT16_MAX;
 }

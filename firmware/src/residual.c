@@ -38,8 +38,8 @@ hg_status hg_residual_step(hg_residual *self, const hg_real *value, hg_real *r)
     for (uint8_t g = 0U; g < config->width; g++) {
         self->input[g] = value[config->signal[g]];
     }
-    if (!hg_linalg_finite(self->input, config->width)) {
-        return HG_E_NUMERIC;
+    if ((HG_REAL_Q31 != 0) && (!hg_linalg_finite(self->input, config->width))) {
+        return HG_E_NUMERIC; /* of the float types, what is not finite makes every sum below so */
     }
     hg_linalg_apply(&config->state, self->z, &config->input, self->input, self->next);
     if (!hg_linalg_finite(self->next, config->order)) {

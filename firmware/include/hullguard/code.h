@@ -25,7 +25,10 @@ typedef struct {           /* flash: one a signal, generated */
 int32_t hg_code_encode(const hg_code_scale *scale, hg_real value);
 
 /** Signal value of a valid code. */
-hg_real hg_code_value(const hg_code_scale *scale, int32_t code);
+static inline hg_real hg_code_value(const hg_code_scale *scale, int32_t code)
+{
+    return hg_real_add(scale->offset, hg_real_of_code(scale->resolution, scale->exponent, code));
+}
 
 /** Is the code one that hg_code_encode() gives to a value? False for HG_CODE_INVALID. */
 bool hg_code_valid(const hg_code_scale *scale, int32_t code);

@@ -40,7 +40,7 @@ typedef struct {                /* flash: one a model, generated */
     uint8_t                   history;    /* rows of the ring of radii, 1 .. 255: more than the taps of any hull, with zonotopes than any interval_max, as many as any bank's window */
     uint8_t                   window;     /* rows of the ring of values: the longest window of a bank; 0 without one */
     uint16_t                  residuals;  /* of all generators together, and one for each bank */
-    uint16_t                  codes;      /* numbers of integer memory: 2 signals */
+    uint16_t                  codes;      /* numbers of integer memory: HG_HOLD_CODES(signals) */
     uint32_t                  reals;      /* numbers of real memory: hg_detector_reals() */
     uint32_t                  sums;       /* numbers of the banks' memory: hg_detector_sums() */
 } hg_detector_config;
@@ -68,7 +68,7 @@ typedef struct {                /* RAM: one a detector */
     hg_ring                   values;    /* of the sent signals, for the banks */
     hg_decision               decision;
     hg_real                  *value;     /* [width] of the last sample */
-    hg_real                  *radius;    /* [width] of the last sample */
+    hg_real                  *radius;    /* [width] of the last sample: the newest row of radii */
     hg_real                  *r;         /* [residuals] of the last sample, generators one after another, then the closest of each bank */
     hg_real                  *J;         /* [residuals] of the last sample */
     hg_real                  *past;      /* [width] scratch */

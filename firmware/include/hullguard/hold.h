@@ -44,6 +44,7 @@ typedef struct {               /* RAM: one a group */
     const hg_hold_config *config;
     int32_t              *sent;      /* [width] codes of the last good frame */
     int32_t              *previous;  /* [width] codes of the one before */
+    int32_t              *promise;   /* [width] how far the sender's may be from them while it is silent, codes */
     uint8_t               age;       /* samples since the last good frame, saturated */
     uint8_t               good;      /* good frames in a row: 0 none yet, 1, or 2 */
     uint8_t               level;     /* of the trigger, known when good is 2 */
@@ -56,11 +57,14 @@ typedef struct {               /* RAM: one a group */
     uint8_t               gap_age;   /* age of the good frame before the gap, samples */
 } hg_hold;
 
+/** Memory of one group, integers. */
+#define HG_HOLD_CODES(width) (3U * (uint32_t)(width))
+
 /** Begin before the first sample: nothing known, radius = span.
- *  @param[in] codes  [2 width] memory, owned by the caller
+ *  @param[in] codes  [HG_HOLD_CODES(width)] memory, owned by the caller
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
- *  @retval HG_E_CONFIG    the trigger's tables are not valid, one of the group's is missing, or interval_max + margin does not fit */
+ *  @retval HG_E_CONFIG    the trigger's tables are not valid, one of the group's is missing or holds no radius, or interval_max + margin does not fit */
 hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes);
 
 /** Take a good frame of the open sample (the one that the next hg_hold_step() will take).
@@ -68,7 +72,7 @@ hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *co
  *  @param[in] continues  did the frame's sequence counter continue the last good frame's?
  *  @retval HG_OK          booked
  *  @retval HG_E_REPEATED  the sample already has a frame; nothing changed
- *  Cost: 2 width copies. */
+ *  Cost: width x 2 copies and, for each level it may be on, a multiplication. */
 hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues);
 
 /** A frame of this group is known to be lost: it came damaged, early, late or refused. From now on only the slew is trusted. */

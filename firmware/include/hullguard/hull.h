@@ -7,7 +7,7 @@
  *
  *  bias: disturbances, all rounding, and the initial state (started at rest, or in a moving plant); a table, then what holds for good.
  *  theta: what lies behind the taps, from above: tail_gi decay_i^j >= |h_ig(taps_g + j)| for all j, and from sample `settle` on likewise what is
- *  left of the initial state. A signal that is nearly always known exactly needs few taps. theta heals as fast as the generator forgets and
+ *  left of the initial state (rest_left decay^(j + 1) at sample settle + j). A signal that is nearly always known exactly needs few taps. theta heals as fast as the generator forgets and
  *  never keeps a maximum. All tables are rounded so that J is never below the exact hull.
  *  One ring of past radii serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
  *  because J is linear in the radii. Not reentrant per instance; safe in interrupt context; no allocation. */
@@ -24,20 +24,20 @@
 typedef struct {                 /* flash: one a generator, generated */
     uint8_t        residuals;    /* 1 .. 255 */
     uint8_t        width;        /* signals read, 1 .. 255 */
-    int8_t         exponent;     /* weight and tail are the numbers below times 2^exponent; 0 for the float types */
+    int8_t         exponent;     /* weight is the numbers below times 2^exponent; 0 for the float types */
     const uint8_t *signal;       /* [width] their places in the ring's rows */
-    const uint8_t *taps;         /* [width] 1 .. ring length - 1 */
-    const hg_real *weight;       /* >= 0: residuals 0 and 1, then 2 and 3, .., of each two (the last may be alone) signal after signal [taps][2 or 1] */
+    const uint8_t *taps;         /* [width] 0 .. ring length - 1 */
+    const hg_real *weight;       /* >= 0: residuals 0 and 1, then 2 and 3, .., of each two (the last may be alone) signal after signal [taps + 1][2 or 1]:
+                                    |h_ig(j)| by lag, then tail_gi */
     uint16_t       settle;       /* rows of the bias tables, 0 .. UINT16_MAX - 1 */
     const hg_real *rest;         /* [settle][residuals] bias after a start within the initial range, then */
-    const hg_real *rest_left;    /* [residuals] what theta begins with */
+    const hg_real *rest_left;    /* [residuals] what theta(settle - 1) is given */
     const hg_real *moving;       /* [settle][residuals] bias after a start anywhere in the state range, then */
-    const hg_real *moving_left;  /* [residuals] what theta begins with */
+    const hg_real *moving_left;  /* [residuals] what theta(settle - 1) is given */
     const hg_real *bias;         /* [residuals] bias from sample settle on */
     uint16_t       ready_rest;   /* samples until the initial state is a small part of J, after a start at rest */
     uint16_t       ready_moving; /* the same after a start in a moving plant */
     const hg_real *decay;        /* [residuals] 0 .. < 1 */
-    const hg_real *tail;         /* [residuals][width] >= 0 */
 } hg_hull_config;
 
 /* How the plant may move when a detector starts. The careful choice is the one that zeroed memory holds. */

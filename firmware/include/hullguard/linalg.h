@@ -25,7 +25,7 @@ void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, c
 /** Do m and n fit hg_linalg_apply(): same rows and valid exponent, these dimensions, both tables present? Constant time. */
 bool hg_linalg_fits(const hg_matrix *m, const hg_matrix *n, uint8_t rows, uint8_t m_cols, uint8_t n_cols);
 
-/** Are all n numbers finite? Cost: n comparisons. */
+/** Are all n numbers finite? Cost: n subtractions and additions. */
 bool hg_linalg_finite(const hg_real *x, uint16_t n);
 
 #endif

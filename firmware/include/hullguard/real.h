@@ -80,6 +80,12 @@ static inline bool hg_real_finite(hg_real x)
     return (x >= -HG_REAL_MAX) && (x <= HG_REAL_MAX);
 }
 
+/** 0 for a finite number, 1 for what did not fit: many are checked by one sum. */
+static inline hg_real hg_real_defect(hg_real x)
+{
+    return hg_real_finite(x) ? 0 : 1;
+}
+
 /** a + b. Exact, or saturated. */
 static inline hg_real hg_real_add(hg_real a, hg_real b)
 {
@@ -156,6 +162,12 @@ static inline hg_real hg_real_abs(hg_real x)
 static inline bool hg_real_finite(hg_real x)
 {
     return (x >= -HG_REAL_MAX) && (x <= HG_REAL_MAX);
+}
+
+/** 0 for a finite number, NaN for what is none: many are checked by one sum. */
+static inline hg_real hg_real_defect(hg_real x)
+{
+    return x - x;
 }
 
 /** a + b. */

@@ -28,6 +28,9 @@ hg_status hg_ring_start(hg_ring *self, uint8_t width, uint8_t length, hg_real *m
 /** Forget all: every number 0. */
 void hg_ring_reset(hg_ring *self);
 
+/** Begin a new sample. Result: [width], where the oldest was; to be filled with finite numbers before the ring is read. Constant time. */
+hg_real *hg_ring_open(hg_ring *self);
+
 /** Enter a new sample.
  *  @param[in] row  [width]
  *  @retval HG_OK         entered

@@ -168,7 +168,7 @@ def zonotopes(tables: Tables) -> list[ZonotopeTable]:
 
 def _storage(tables: Tables) -> list[str]:
     t, prefix = f"hg_{tables.name}", f"HG_{tables.name.upper()}"
-    codes, closing = max(2 * tables.signals, 1), max(len(tables.groups[tables.closing].signals), 1)
+    codes, closing = max(tables.codes, 1), max(len(tables.groups[tables.closing].signals), 1)
     threshold = "zonotope" if zonotopes(tables) else "hull"
     own = [("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), (f"hg_{threshold}", threshold, len(tables.generators))]
     own += [("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums)]
@@ -195,7 +195,7 @@ def _storage(tables: Tables) -> list[str]:
         "/* Memory of all senders of the model, for whoever plays the plant; an ECU that is one of them needs one hg_sender only. */",
         "typedef struct {",
         f"    hg_sender sender[{prefix}_GROUPS];",
-        f"    int32_t   code[{codes}];",
+        f"    int32_t   code[{max(2 * tables.signals, 1)}];",
         f"}} {t}_senders;",
         "",
         "/** Start every sender; self->sender[group] is then ready for hg_sender_step().",
@@ -385,8 +385,8 @@ def _groups(tables: Tables, names: Names) -> list[str]:
 
 def _taps(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
     lines = table("uint8_t", f"{n}_taps", f"{len(g.taps)}", [unsigned(g.taps)], "lags that are summed one by one, by signal")
-    about = "magnitude of the impulse response, residual units a signal unit, by two residuals, signal and lag"
-    lines += [*comment(f"{n}_weight [{sum(g.taps) * len(g.output)}]: {about}"), f"static const hg_real {n}_weight[] = {{"]
+    about = "magnitude of the impulse response, residual units a signal unit, by two residuals, signal and lag, and of the tail behind"
+    lines += [*comment(f"{n}_weight [{sum(t + 1 for t in g.taps) * len(g.output)}]: {about}"), f"static const hg_real {n}_weight[] = {{"]
     for first, signal, block in g.blocks:
         whose = f"residuals {first + 1} and {first + 2}" if len(block[0]) > 1 else f"residual {first + 1}"
         lines.append(f"    /* {whose}, {signals[g.wide[signal]]} */")
@@ -416,8 +416,7 @@ def _hull(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
         lines += table("hg_real", f"{n}_{part}_left", f"{residuals}", [reals(getattr(g, f"{part}_left"))], "what is left of the initial state then")
     lines += table("hg_real", f"{n}_bias", f"{residuals}", [reals(g.bias)], "threshold's part from disturbance and rounding from then on")
-    lines += table("hg_real", f"{n}_decay", f"{residuals}", [reals(g.decay)], "by how much the part behind the taps shrinks in a sample")
-    return lines + table("hg_real", f"{n}_tail", f"{residuals}][{len(g.wide)}", [reals(r) for r in g.tail], "weight of a radius that leaves the taps, residual units a signal unit")
+    return lines + table("hg_real", f"{n}_decay", f"{residuals}", [reals(g.decay)], "by how much the part behind the taps shrinks in a sample")
 
 
 REDUCTIONS = {TRUNCATE: "HG_REDUCTION_TRUNCATE", BOX: "HG_REDUCTION_BOX", BALL: "HG_REDUCTION_BALL"}
@@ -562,7 +561,7 @@ def _generators(tables: Tables) -> list[str]:
             f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .exponent = {scaled(g.exponents[2])}, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'},",
             f"     .taps = {n}_taps, .weight = {n}_weight, .settle = {g.settle}U, .rest = {n}_rest, .rest_left = {n}_rest_left,",
             f"     .moving = {n}_moving, .moving_left = {n}_moving_left, .bias = {n}_bias,",
-            f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay, .tail = {n}_tail}},",
+            f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay}},",
         ]
     return [*lines, "};", ""]
 
@@ -608,7 +607,7 @@ def _node(design: Design) -> list[str]:
         f"    .decision = {{.generators = {tables.judged}U, .feeds = feeds, .faults = moved_by,",
         f"                 .up = {tables.up}U, .down = {tables.down}U, .latch = {boolean(tables.latch)}}},",
         f"    .history = {tables.history}U, .window = {tables.window}U, .residuals = {tables.residuals}U,",
-        f"    .codes = {2 * tables.signals}U, .reals = {tables.reals}UL, .sums = {tables.sums}UL,",
+        f"    .codes = {tables.codes}U, .reals = {tables.reals}UL, .sums = {tables.sums}UL,",
         "};",
         "",
     ]
@@ -646,7 +645,7 @@ def _starts(tables: Tables) -> list[str]:
         "    }",
         "    const hg_node_memory memory = {",
         *entries(f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},", 21),
-        f"                     .alarm = self->alarm, .code = self->code, .codes = {2 * tables.signals}U, .real = self->real, .reals = {tables.reals}UL,",
+        f"                     .alarm = self->alarm, .code = self->code, .codes = {tables.codes}U, .real = self->real, .reals = {tables.reals}UL,",
         f"                     .sum = {own[5]}, .sums = {tables.sums}UL}},",
         "        .link = self->link,",
         "        .closing = self->closing,",

@@ -146,7 +146,7 @@ class Native:
         d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = t.judged, t.up, t.down, t.latch
         d.decision.feeds = self._ints("uint8_t", [g.feeds for g in t.judging])
         d.decision.faults = self._ints("uint32_t", [g.faults for g in t.judging])
-        d.history, d.window, d.residuals, d.codes = t.history, t.window, t.residuals, 2 * t.signals
+        d.history, d.window, d.residuals, d.codes = t.history, t.window, t.residuals, t.codes
         d.reals, d.sums = self.library.lib.hg_detector_reals(d), self.library.lib.hg_detector_sums(d)
         return d
 
@@ -189,7 +189,7 @@ class Native:
         h.weight = self._reals([x for _, _, block in g.blocks for row in block for x in row])
         h.settle, h.rest, h.moving = g.settle, self._reals(g.rest), self._reals(g.moving)
         h.rest_left, h.moving_left, h.bias = self._reals(g.rest_left), self._reals(g.moving_left), self._reals(g.bias)
-        h.ready_rest, h.ready_moving, h.decay, h.tail = g.ready_rest, g.ready_moving, self._reals(g.decay), self._reals(g.tail)
+        h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, self._reals(g.decay)
 
 
 def frame_out(library: Library, frame: Any) -> Frame:
@@ -251,7 +251,7 @@ class Node:
         own.hold, own.predict, own.alarm = room("hg_hold", groups), room("hg_predict", len(t.predictors)), room("hg_alarm", t.judged)
         own.residual, own.hull, own.bank = room("hg_residual", len(t.generators)), room("hg_hull", len(t.generators)), room("hg_bank", len(t.banks))
         own.zonotope = room("hg_zonotope", len(t.generators))
-        own.code, own.codes, own.real, own.reals = room("int32_t", 2 * t.signals), d.codes, room("hg_real", d.reals), d.reals
+        own.code, own.codes, own.real, own.reals = room("int32_t", t.codes), d.codes, room("hg_real", d.reals), d.reals
         own.sum, own.sums = room("hg_acc", d.sums), d.sums
         memory.link, memory.closing = room("hg_link", groups), room("int32_t", len(t.groups[t.closing].signals) + 1)
         self.node = ffi.new("hg_node *")

@@ -51,7 +51,7 @@ static hg_node_memory node_memory(arena *a, const hg_node_config *node)
     m.detector.zonotope = take(a, d->generators, sizeof(hg_zonotope));
     m.detector.bank = take(a, d->banks, sizeof(hg_bank));
     m.detector.alarm = take(a, (size_t)d->generators + d->banks, sizeof(hg_alarm));
-    m.detector.codes = (uint16_t)(2U * d->signals);
+    m.detector.codes = (uint16_t)HG_HOLD_CODES(d->signals);
     m.detector.code = take(a, m.detector.codes, sizeof(int32_t));
     m.detector.reals = hg_detector_reals(d);
     m.detector.real = take(a, m.detector.reals, sizeof(hg_real));

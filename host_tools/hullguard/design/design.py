@@ -325,9 +325,9 @@ class Derived:
 
 
 def rewind_of(model: Model, place: int) -> int:
-    """Samples within which the radius of a signal may still be rewritten: of a derived one, whatever it is derived from."""
+    """How far back the radius of a signal may still be rewritten: of a derived one, whatever it is derived from."""
     own = [g.trigger.interval_max for g in model.groups if place in g.signals or place >= len(model.signals)]
-    return max(own)
+    return max(own) - 1
 
 
 def _derived(model: Model, stored: Stored, groups: tuple[GroupTable, ...]) -> Derived:

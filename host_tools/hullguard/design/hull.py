@@ -24,8 +24,8 @@ TAPS_MAX = 200
 SMALLEST_DECAY = 1e-6  # of a generator that forgets all in finite time
 SETTLE_MAX = 2000
 LAGS_MAX = 400  # over which the growth of rounding is followed
-TAIL_SHARE = 0.005  # of the threshold: what the bound of the lags behind the taps may add to them
-LATE_SHARE = 0.2  # the same when all radii are as wide as after a frame that did not come
+TAIL_SHARE = 0.01  # of the threshold: what the bound of the lags behind the taps may add to them
+LATE_SHARE = 0.7  # the same when all radii are as wide as after a frame that did not come
 DECAYS = 40  # tried for a tail
 DOUBLE = 1 + 1e-9  # more than what double precision loses
 SLOWER = 1 - 1e-6  # a tail is made for a decay that much below the table's: rounding may take that much from it each sample
@@ -64,7 +64,7 @@ class HullTables:
     rest: Array  # samples x residuals: bias after a start, its last row holds for good; the hull keeps the first `settle` of them
     moving: Array  # samples x residuals
     settle: int
-    rest_left: Array  # residuals: what the tail takes over of the initial state then
+    rest_left: Array  # residuals: what the tail is given for the initial state the sample before
     moving_left: Array  # residuals
     bias: Array  # residuals: from then on
     ready_rest: int
@@ -221,7 +221,7 @@ def _taps(envelope: Envelope, limits: tuple[tuple[Array, Array], ...], least: Ar
         parts = [envelope.excess(taps, radius) / limit[:, None] for radius, limit in limits]
         return float(np.max(parts, axis=0).min(1).max())
 
-    taps = next((t for n in range(1, most) if worst(t := np.maximum(least, n)) <= 1), np.full(len(least), most))
+    taps = next((t for n in range(most) if worst(t := np.maximum(least, n)) <= 1), np.full(len(least), most))
     spare = set(range(len(taps)))
     while spare:
         costs = {}
@@ -281,7 +281,7 @@ class Expected:
 
     usual: Array  # most of the time
     late: Array  # one sample after a frame that did not come
-    rewind: tuple[int, ...]  # samples within which one may still be rewritten
+    rewind: tuple[int, ...]  # how far back one may still be rewritten, samples
 
 
 def _start(lin: Linear, T: Array, F: Array, x: Array) -> Start:
@@ -335,7 +335,7 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
     envelope = _envelope(response, slowest, most, fixed.like.decay[:, None] if fixed else _decays(slowest, F.shape[1]))
     usual, late = driven[-1] + at_once + share.sum(0), driven[-1] + at_once + (weights * expected.late).sum((0, 2))
     limits = (radius, TAIL_SHARE * usual), (expected.late, LATE_SHARE * late)
-    taps = np.array(fixed.like.taps) if fixed else _taps(envelope, limits, np.maximum(np.array(expected.rewind), 1), most)
+    taps = np.array(fixed.like.taps) if fixed else _taps(envelope, limits, np.array(expected.rewind), most)
     chosen = np.max([envelope.excess(taps, r) / limit[:, None] for r, limit in limits], axis=0).argmin(1)
     one = np.arange(len(chosen))
     decay = envelope.decay[one, chosen]
@@ -349,7 +349,7 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
     limit = (driven[-1] + at_once) * (1 + 1e-9)
     driven = np.concatenate([np.zeros((1, F.shape[1])), driven[:-1]]) + at_once
     steady = limit + share.sum(0)
-    used = np.where(np.arange(taps.max())[:, None, None] < taps, weights[: taps.max()], 0.0)
+    used = np.where(np.arange(max(taps.max(), 1))[:, None, None] < taps, weights[: max(taps.max(), 1)], 0.0)
     widen = DOUBLE if fixed else 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
     up: Callable[[Array], Array] = np.asarray if fixed else up32
     slow = decay * SLOWER
@@ -361,8 +361,8 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
         rest=up(rest.rows(driven, limit, last) * widen),
         moving=up(moving.rows(driven, limit, last) * widen),
         settle=settle,
-        rest_left=up(rest.left(driven, limit, slow)[settle] * widen),
-        moving_left=up(moving.left(driven, limit, slow)[settle] * widen),
+        rest_left=up(rest.left(driven, limit, slow)[settle] / slow * widen),
+        moving_left=up(moving.left(driven, limit, slow)[settle] / slow * widen),
         bias=up(limit * widen),
         ready_rest=_ready(rest.added, steady),
         ready_moving=_ready(moving.added, steady),

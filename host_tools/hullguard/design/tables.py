@@ -142,9 +142,14 @@ class GeneratorTable:
 
     @property
     def blocks(self) -> list[tuple[int, int, list[list[float]]]]:
-        """The weights as they lie in memory: (first residual, signal, taps x 2 or 1) for each two residuals, signal after signal."""
+        """The weights as they lie in memory: (first residual, signal, taps and tail x 2 or 1) for each two residuals, signal after signal."""
         pairs = [range(i, min(i + 2, len(self.output))) for i in range(0, len(self.output), 2)]
-        return [(pair[0], g, [[self.weight[lag][i][g] for i in pair] for lag in range(taps)]) for pair in pairs for g, taps in enumerate(self.taps)]
+        made = []
+        for pair in pairs:
+            for g, taps in enumerate(self.taps):
+                lags = [[self.weight[lag][i][g] for i in pair] for lag in range(taps)]
+                made.append((pair[0], g, [*lags, [self.tail[i][g] for i in pair]]))
+        return made
 
 
 @dataclass(frozen=True)
@@ -212,7 +217,12 @@ class Tables:
         own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
         own += sum(len(g.output) if g.zonotope is None else g.zonotope.reals for g in self.generators)
         own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
-        return 3 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
+        return 2 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
+
+    @property
+    def codes(self) -> int:
+        """HG_HOLD_CODES of all groups."""
+        return 3 * self.signals
 
     @property
     def sums(self) -> int:
