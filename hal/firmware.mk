@@ -1,7 +1,9 @@
-# make firmware: for every hal/toolchains/NAME.mk the library and a detector image, $(BUILD)/firmware/NAME/{libhullguard.a,detector.elf}.
+# make firmware: for every hal/toolchains/NAME.mk the library and a detector image, $(BUILD)/firmware/NAME/{libhullguard.a,detector.elf}, and
+# both once more in fixed point, NAME-q31. Rules of this file and of the target tests are for a build: NAME or NAME-q31.
 # A toolchain file says, each with _NAME behind it:
 #   CROSS    prefix of the compiler's programs         MACHINE  its flags
 #   REAL     number type                               ENDIAN   little or big
+#   INTEGER  flags that keep a fixed-point build off the FPU, where the compiler would move other things through it
 #   START    source of the first instructions          MEMORY   symbols of hal/start/image.ld: where flash and RAM are
 #   LIBC     C library that test programs may use: newlib (bare processor), glibc (Linux), none
 #   RUN      emulator that takes a program; empty: none, and nothing but the contents of library and image is tested
@@ -12,6 +14,7 @@ SEMIHOSTING := -display none -monitor none -serial null -chardev stdio,id=consol
 
 TOOLCHAINS := $(wildcard hal/toolchains/*.mk)
 TARGETS    := $(sort $(basename $(notdir $(TOOLCHAINS))))
+BUILDS     := $(foreach t,$(TARGETS),$(t) $(t)-q31)
 include $(TOOLCHAINS)
 
 FIRMWARE     := $(BUILD)/firmware
@@ -19,12 +22,15 @@ FREESTANDING := -ffreestanding -isystem hal/toolchains/include $(OPTIMISE) -ffun
 IMAGE_SRC    := hal/start/start.c hal/start/memory.c
 DETECTOR_SRC := firmware/apps/detector_main.c firmware/models/platoon.c hal/blank/blank.c
 
-cross_cc   = $(CROSS_$(1))gcc $(MACHINE_$(1)) $(REAL_FLAG_$(REAL_$(1)))
-image_link = -static -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--build-id=none -T hal/start/image.ld $(MEMORY_$(1):%=-Wl,--defsym=%)
-image_objects = $(addprefix $(FIRMWARE)/$(1)/,$(addsuffix .o,$(basename $(START_$(1)) $(IMAGE_SRC) $(2))))
+target_of  = $(1:%-q31=%)
+real_of    = $(if $(filter %-q31,$(1)),q31,$(REAL_$(1)))
+build_cc   = $(CROSS_$(1))gcc $(MACHINE_$(1)) $(REAL_FLAG_$(2)) $(if $(filter q31,$(2)),$(INTEGER_$(1)))
+cross_cc   = $(call build_cc,$(call target_of,$(1)),$(call real_of,$(1)))
+image_link = -static -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,--build-id=none -T hal/start/image.ld $(MEMORY_$(call target_of,$(1)):%=-Wl,--defsym=%)
+image_objects = $(addprefix $(FIRMWARE)/$(1)/,$(addsuffix .o,$(basename $(START_$(call target_of,$(1))) $(IMAGE_SRC) $(2))))
 
 .PHONY: firmware
-firmware: $(foreach t,$(TARGETS),$(FIRMWARE)/$(t)/libhullguard.a $(FIRMWARE)/$(t)/detector.elf) ## library and detector image for every processor: build/firmware/NAME/
+firmware: $(foreach b,$(BUILDS),$(FIRMWARE)/$(b)/libhullguard.a $(FIRMWARE)/$(b)/detector.elf) ## library and detector image for every processor: build/firmware/NAME/
 
 # $(call assembly,FOLDER,SOURCES,COMMAND): as objects, for sources in assembly language.
 define assembly
@@ -33,14 +39,15 @@ $(2:%.S=$(1)/%.o): $(1)/%.o: %.S Makefile
 	$$(Q)$(3) $$(INCLUDE) -c $$< -o $$@
 endef
 
-define firmware_target
-$(eval $(call objects,$(FIRMWARE)/$(1),$(LIB_SRC) $(IMAGE_SRC) $(DETECTOR_SRC) $(filter %.c,$(START_$(1))),$$(call cross_cc,$(1)) $$(FREESTANDING)))
-$(eval $(call assembly,$(FIRMWARE)/$(1),$(filter %.S,$(START_$(1))),$$(call cross_cc,$(1))))
+# $(call firmware_build,BUILD,TARGET)
+define firmware_build
+$(eval $(call objects,$(FIRMWARE)/$(1),$(LIB_SRC) $(IMAGE_SRC) $(DETECTOR_SRC) $(filter %.c,$(START_$(2))),$$(call cross_cc,$(1)) $$(FREESTANDING)))
+$(eval $(call assembly,$(FIRMWARE)/$(1),$(filter %.S,$(START_$(2))),$$(call cross_cc,$(1))))
 $(eval $(call archive,$(FIRMWARE)/$(1)/libhullguard.a,$(FIRMWARE)/$(1),$(LIB_SRC)))
-$(patsubst %.c,$(FIRMWARE)/$(1)/%.o,$(LIB_SRC) $(IMAGE_SRC) $(DETECTOR_SRC)) $(FIRMWARE)/$(1)/detector.elf: hal/toolchains/$(1).mk hal/firmware.mk
-$(FIRMWARE)/$(1)/libhullguard.a: AR := $(CROSS_$(1))ar
+$(patsubst %.c,$(FIRMWARE)/$(1)/%.o,$(LIB_SRC) $(IMAGE_SRC) $(DETECTOR_SRC)) $(FIRMWARE)/$(1)/detector.elf: hal/toolchains/$(2).mk hal/firmware.mk
+$(FIRMWARE)/$(1)/libhullguard.a: AR := $(CROSS_$(2))ar
 $(FIRMWARE)/$(1)/hal/start/memory.o: FREESTANDING += -fno-tree-loop-distribute-patterns
 $(FIRMWARE)/$(1)/detector.elf: $(call image_objects,$(1),$(DETECTOR_SRC)) $(FIRMWARE)/$(1)/libhullguard.a hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -nostdlib -o $$@ $$(filter %.o %.a,$$^) -lgcc
 endef
-$(foreach t,$(TARGETS),$(eval $(call firmware_target,$(t))))
+$(foreach b,$(BUILDS),$(eval $(call firmware_build,$(b),$(call target_of,$(b)))))

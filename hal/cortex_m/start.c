@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-#ifdef __ARM_FP
+#if defined(__ARM_FP) && !defined(HG_REAL_Q31)
+#define FPU /* stays off in fixed point, so that what touches it traps */
 #define CPACR (*(volatile uint32_t *)0xE000ED88UL)
 #define CPACR_FPU (0xFUL << 20U) /* coprocessors 10 and 11, for all */
 #endif
@@ -35,7 +36,7 @@ __attribute__((section(".hg_reset"), used)) static const vector vectors[16] = {
 
 _Noreturn void hg_reset(void)
 {
-#ifdef __ARM_FP
+#ifdef FPU
     CPACR |= CPACR_FPU;
     __asm__ volatile("dsb\n\tisb" ::: "memory"); /* on before the next floating-point instruction */
 #endif

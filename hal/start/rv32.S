@@ -1,4 +1,4 @@
-/* RV32 from reset to hg_start(): hart 0 alone, traps, the stack pointer, the FPU. */
+/* RV32 from reset to hg_start(): hart 0 alone, traps, the stack pointer, the FPU: off in fixed point, so that what touches it traps. */
     .option arch, +zicsr    # named here, not in the flags: the compiler has no libgcc for the long name of the same set
     .section .hg_reset, "ax"
     .global hg_reset
@@ -8,7 +8,7 @@ hg_reset:
     la t0, trap
     csrw mtvec, t0
     la sp, hg_stack
-#ifdef __riscv_flen
+#if defined(__riscv_flen) && !defined(HG_REAL_Q31)
     li t0, 0x2000           # mstatus.FS = initial
     csrs mstatus, t0
     fscsr zero              # round to nearest

@@ -1,6 +1,7 @@
 # Cortex-M33: single-precision FPU. QEMU's mps2-an505, which starts in its secure memory.
 CROSS_cortex_m33     := arm-none-eabi-
 MACHINE_cortex_m33   := -mcpu=cortex-m33 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
+INTEGER_cortex_m33   := -mgeneral-regs-only
 REAL_cortex_m33      := f32
 ENDIAN_cortex_m33    := little
 LIBC_cortex_m33      := newlib

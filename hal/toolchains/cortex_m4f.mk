@@ -1,6 +1,7 @@
 # Cortex-M4F: single-precision FPU. QEMU's mps2-an386.
 CROSS_cortex_m4f     := arm-none-eabi-
 MACHINE_cortex_m4f   := -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard
+INTEGER_cortex_m4f   := -mgeneral-regs-only
 REAL_cortex_m4f      := f32
 ENDIAN_cortex_m4f    := little
 LIBC_cortex_m4f      := newlib

@@ -1,6 +1,7 @@
 # Cortex-M7 with its single-precision FPU. QEMU's mps2-an500.
 CROSS_cortex_m7      := arm-none-eabi-
 MACHINE_cortex_m7    := -mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
+INTEGER_cortex_m7    := -mgeneral-regs-only
 REAL_cortex_m7       := f32
 ENDIAN_cortex_m7     := little
 LIBC_cortex_m7       := newlib

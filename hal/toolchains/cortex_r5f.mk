@@ -1,6 +1,7 @@
 # Cortex-R5F, A32. QEMU's integratorcp takes any 32-bit ARM core, which is enough for programs without a CAN controller.
 CROSS_cortex_r5f     := arm-none-eabi-
 MACHINE_cortex_r5f   := -mcpu=cortex-r5 -mfpu=vfpv3-d16 -mfloat-abi=hard -marm
+INTEGER_cortex_r5f   := -mgeneral-regs-only
 REAL_cortex_r5f      := f32
 ENDIAN_cortex_r5f    := little
 LIBC_cortex_r5f      := newlib

@@ -15,7 +15,7 @@
 #define REPLAY_AT 260U
 #define FAULT_AT 320U
 #define END_AT 360U
-#define BIAS HG_REAL_C(5.0)
+#define BIAS_CODE 5000    /* of the first signal: 5 m */
 
 typedef enum { TOLD_NOTHING = 0, STARTED, HEALTHY, STALE, ANEW, HEALTHY_AGAIN, FOUND, WRONG } chapter; /* of what the verdicts tell */
 
@@ -109,7 +109,9 @@ static void speak(script *self)
     }
     for (uint8_t g = 0U; g < HG_PLATOON_GROUPS; g++) {
         hg_real value[HG_PLATOON_SIGNALS] = {HG_REAL_ZERO};
-        value[0] = ((g == (uint8_t)HG_PLATOON_GROUP_MEASUREMENT) && (self->k >= FAULT_AT)) ? BIAS : HG_REAL_ZERO;
+        if ((g == (uint8_t)HG_PLATOON_GROUP_MEASUREMENT) && (self->k >= FAULT_AT)) {
+            value[0] = hg_code_value(&hg_platoon_config.message[g].scale[0], BIAS_CODE);
+        }
         if ((hg_sender_step(&self->senders.sender[g], self->k, value, &self->frame[self->frames]) == HG_OK) && (!lost)) {
             self->frames++;
         }

@@ -1,8 +1,9 @@
 /** @file
  *  The nodes of the shipped models over a fixed drive: random walks, standstill, a link that loses, damages, doubles and delays frames, a clock
  *  that closes samples, outages. A hash is printed over every verdict, every report and the bits of every value, radius, r and J. float32
- *  arithmetic is exact to the bit by IEEE 754 wherever no product is fused into a sum and no subnormal number is flushed to zero, so that
- *  every processor must print the same; to have some of those, the residual generators run once more on tiny signals. No C library is needed. */
+ *  arithmetic is exact to the bit by IEEE 754 wherever no product is fused into a sum and no subnormal number is flushed to zero, and fixed point
+ *  is integers, so that every processor must print the same. To have subnormal numbers, and in fixed point such as do not fit, the residual
+ *  generators run once more on signals of such a size. No C library is needed. */
 
 #include "console.h"
 #include "openacc.h"
@@ -14,12 +15,20 @@
 #define SAMPLES 4096UL
 #define PART 1024UL   /* samples between two lines: they tell where two processors part */
 #define WALK 256UL    /* samples of random walk, then as many of standstill */
-#define TINY 0x1p-144F /* makes signals of at most 30000 codes, and what is computed from them, subnormal */
 #define GROUPS 8U
 #define SIGNALS 32U
 #define FNV_BASIS 0xCBF29CE484222325ULL
 #define FNV_PRIME 0x100000001B3ULL
+
+/* A signal as large as a number can be; or, of at most 30000 codes, subnormal as what is computed from it. */
+#if HG_REAL_Q31
+#define EXTREME(code) (((code) < 0) ? -HG_REAL_MAX : HG_REAL_MAX)
+#define EXTREMES " refused "
+#else
+#define EXTREME(code) ((hg_real)(code) * 0x1p-144F)
+#define EXTREMES " subnormal "
 #define SMALLEST_NORMAL 0x00800000UL
+#endif
 
 typedef struct {
     const char             *name;
@@ -39,7 +48,7 @@ typedef struct {
     uint64_t       hash;
     uint32_t       steps;
     uint32_t       alarms;
-    uint32_t       subnormal;        /* numbers hashed that are */
+    uint32_t       extremes;         /* numbers hashed that are subnormal; in fixed point steps refused for what did not fit */
 } drive;
 
 /* One at a time: a processor with 16 KB of RAM runs this. */
@@ -105,8 +114,10 @@ static void take_reals(drive *d, const hg_real *x, size_t n)
     for (size_t i = 0U; i < n; i++) {
         uint32_t bits;
         (void)memcpy(&bits, &x[i], sizeof(bits));
+#if !HG_REAL_Q31
         const uint32_t magnitude = bits & 0x7FFFFFFFUL;
-        d->subnormal += ((magnitude > 0U) && (magnitude < SMALLEST_NORMAL)) ? 1U : 0U;
+        d->extremes += ((magnitude > 0U) && (magnitude < SMALLEST_NORMAL)) ? 1U : 0U;
+#endif
         take(d, bits);
     }
 }
@@ -249,13 +260,13 @@ static void print_state(const drive *d, uint32_t samples)
     print_hex(" samples ", samples, 4U);
     print_hex(" steps ", d->steps, 4U);
     print_hex(" alarms ", d->alarms, 4U);
-    print_hex(" subnormal ", d->subnormal, 4U);
+    print_hex(EXTREMES, d->extremes, 4U);
     print_hex(" hash ", d->hash, 16U);
     print("\n");
 }
 
-/* No signal of a bus is so small. Uses the node's residual generators, whose states nobody needs any more. */
-static void fade(drive *d)
+/* No signal of a bus is of such a size. Uses the node's residual generators, whose states nobody needs any more. */
+static void run_extremes(drive *d)
 {
     hg_detector *const detector = &d->node->detector;
     hg_real value[SIGNALS] = {HG_REAL_ZERO};
@@ -265,9 +276,11 @@ static void fade(drive *d)
         for (uint32_t k = 0U; k < WALK; k++) {
             move(d, k);
             for (size_t j = 0U; j < SIGNALS; j++) {
-                value[j] = (hg_real)d->code[j] * TINY;
+                value[j] = EXTREME(d->code[j]);
             }
-            take(d, (uint32_t)hg_residual_step(residual, value, detector->r));
+            const hg_status status = hg_residual_step(residual, value, detector->r);
+            d->extremes += (status == HG_E_NUMERIC) ? 1U : 0U;
+            take(d, (uint32_t)status);
             take_reals(d, detector->r, residual->config->residuals);
             take_reals(d, residual->z, residual->config->order);
         }
@@ -297,9 +310,9 @@ static bool run(const subject *of)
             print_state(&d, k + 1U);
         }
     }
-    fade(&d);
+    run_extremes(&d);
     print_state(&d, SAMPLES);
-    return d.subnormal > 0U;
+    return d.extremes > 0U;
 }
 
 int main(void)

@@ -3,10 +3,12 @@
 #   corpus  tests/target/corpus.c: every target that has an emulator computes what the host does, to the bit
 #   node    firmware/apps/detector_main.c on a board with a story: frames lost, a processor that stood still, a fault
 #   unit    tests/unit, unchanged, with the small CMocka of this folder: targets with a C library
+# Image, corpus and node are tested of both builds of a target, its own number type and fixed point; unit tests compute in float.
 # A test that passed is run again only when it changed; its output is beside it, in .log, and QEMU's in .err.
 
 TARGET_TESTS := $(BUILD)/target-tests
 RUN_TARGETS  := $(foreach t,$(TARGETS),$(if $(RUN_$(t)),$(t)))
+RUN_BUILDS   := $(foreach t,$(RUN_TARGETS),$(t) $(t)-q31)
 UNIT_TARGETS := $(foreach t,$(RUN_TARGETS),$(if $(filter-out none,$(LIBC_$(t))),$(t)))
 
 # Unit tests that need more than the 16 KB of RAM of the microbit: what was compiled for Cortex-M0 runs on the board of Cortex-M3, whose
@@ -17,6 +19,7 @@ UNIT_BOARD_cortex_m0 := cortex_m3
 # These take 7 to 60 s on each target. `make test` runs the others, on the smallest core, on one with an FPU and on the big-endian one, beside
 # images and corpus of all; `make target-tests` runs all on all.
 UNIT_SLOW  := test_adversary test_e2e_errors test_robust test_zonotope
+CORPUS_QUICK := $(filter-out $(patsubst %,%-q31,cortex_m3 cortex_m33 cortex_m7 cortex_r5f rv32imafc),$(RUN_BUILDS))# theirs are the instructions of the others
 UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TESTS)/$(t)/%.ok,$(filter-out $(UNIT_SLOW),$(UNIT_TESTS))))
 
 # What a program is made of beside its test: by the C library of its target.
@@ -37,46 +40,51 @@ UNIT_LINK_newlib   = $(call image_link,$(1)) --specs=nano.specs -u _printf_float
 UNIT_LINK_glibc    = -static -no-pie
 
 target_objects = $(addprefix $(TARGET_TESTS)/$(1)/,$(patsubst %.c,%.o,$(2)))
-target_start   = $(if $(filter-out glibc,$(LIBC_$(1))),$(addprefix $(FIRMWARE)/$(1)/,$(addsuffix .o,$(basename $(START_$(1)) hal/start/start.c hal/start/memory.c))))
+target_start   = $(if $(filter-out glibc,$(LIBC_$(2))),$(addprefix $(FIRMWARE)/$(1)/,$(addsuffix .o,$(basename $(START_$(2)) hal/start/start.c hal/start/memory.c))))
 unit_board     = $(if $(filter $(notdir $(2)),$(UNIT_LARGE_$(1))),$(UNIT_BOARD_$(1)),$(1))
 target_run     = QEMU_AUDIO_DRV=none timeout --foreground -k 5 900 $(RUN_$(1)) $(2) </dev/null
 
 .PHONY: target-tests target-quick target-image target-corpus target-node target-unit
 TEST_PARTS += target-quick
 target-tests: target-image target-corpus target-node target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
-target-quick: target-image target-corpus target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
-target-image: $(TARGETS:%=$(FIRMWARE)/%/image.ok)
-target-corpus: $(RUN_TARGETS:%=$(TARGET_TESTS)/%/corpus.ok)
-target-node: $(RUN_TARGETS:%=$(TARGET_TESTS)/%/node.ok)
+target-quick: target-image $(CORPUS_QUICK:%=$(TARGET_TESTS)/%/corpus.ok) target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
+target-image: $(BUILDS:%=$(FIRMWARE)/%/image.ok)
+target-corpus: $(RUN_BUILDS:%=$(TARGET_TESTS)/%/corpus.ok)
+target-node: $(RUN_BUILDS:%=$(TARGET_TESTS)/%/node.ok)
 target-unit: $(UNIT_TARGETS:%=target-unit-%)
 
 $(FIRMWARE)/%/image.ok: $(FIRMWARE)/%/detector.elf $(FIRMWARE)/%/libhullguard.a tests/target/check_image
-	@tests/target/check_image $(CROSS_$*) $(ENDIAN_$*) $(@D) && touch $@
+	@tests/target/check_image $(CROSS_$(call target_of,$*)) $(ENDIAN_$(call target_of,$*)) $(call real_of,$*) $(@D) && touch $@
 
-$(eval $(call objects,$(TARGET_TESTS)/host,$(CORPUS_SRC) $(CONSOLE_glibc),$$(CC) $$(OPTIMISE) $(REAL_FLAG_f32) -Itests/target))
-$(TARGET_TESTS)/host/corpus: $(call target_objects,host,$(CORPUS_SRC) $(CONSOLE_glibc)) $(STATIC_LIB)
-	$(Q)$(CC) -o $@ $^
-$(TARGET_TESTS)/host/corpus.log: $(TARGET_TESTS)/host/corpus
-	$(Q)$< >$@
+# $(call host_corpus,REAL,LIBRARY)
+define host_corpus
+$(eval $(call objects,$(TARGET_TESTS)/host-$(1),$(CORPUS_SRC) $(CONSOLE_glibc),$$(CC) $$(OPTIMISE) $(REAL_FLAG_$(1)) -Itests/target))
+$(TARGET_TESTS)/host-$(1)/corpus: $(call target_objects,host-$(1),$(CORPUS_SRC) $(CONSOLE_glibc)) $(2)
+	$$(Q)$$(CC) -o $$@ $$^
+$(TARGET_TESTS)/host-$(1)/corpus.log: $(TARGET_TESTS)/host-$(1)/corpus
+	$$(Q)$$< >$$@
+endef
+$(eval $(call host_corpus,f32,$(STATIC_LIB)))
+$(eval $(call host_corpus,q31,$(LIB_SRC:%.c=$(BUILD)/shared-q31/%.o)))
 
-# $(call target_tests,TARGET,LIBC)
+# $(call target_tests,BUILD,LIBC,TARGET,REAL)
 define target_tests
-$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC) $(NODE_SRC)) $(CONSOLE_$(2)) $(CMOCKA_$(2)) $(if $(CMOCKA_$(2)),$(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
-$(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%) $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/$(1)/node: hal/start/image.ld
-$(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC) $(CONSOLE_$(2))) $(call target_start,$(1)) $(FIRMWARE)/$(1)/libhullguard.a
+$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC) $(NODE_SRC)) $(CONSOLE_$(2)) $(if $(filter $(1),$(UNIT_TARGETS)),$(CMOCKA_$(2)) $(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
+$(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/$(1)/node: hal/start/image.ld
+$(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC) $(CONSOLE_$(2))) $(call target_start,$(1),$(3)) $(FIRMWARE)/$(1)/libhullguard.a
 	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$(filter %.o %.a,$$^) -lgcc
-$(TARGET_TESTS)/$(1)/corpus.ok: $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/host/corpus.log
-	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && diff $(TARGET_TESTS)/host/corpus.log $$<.log && touch $$@ && echo "  ok  $$<" || { echo "FAILED $$<, see $$<.log"; exit 1; }
-$(TARGET_TESTS)/$(1)/node: $(call target_objects,$(1),$(NODE_SRC) $(CONSOLE_$(2))) $(call target_start,$(1)) $(FIRMWARE)/$(1)/libhullguard.a
+$(TARGET_TESTS)/$(1)/corpus.ok: $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/host-$(4)/corpus.log
+	@$$(call target_run,$(3),$$<) >$$<.log 2>$$<.err && diff $(TARGET_TESTS)/host-$(4)/corpus.log $$<.log && touch $$@ && echo "  ok  $$<" || { echo "FAILED $$<, see $$<.log"; exit 1; }
+$(TARGET_TESTS)/$(1)/node: $(call target_objects,$(1),$(NODE_SRC) $(CONSOLE_$(2))) $(call target_start,$(1),$(3)) $(FIRMWARE)/$(1)/libhullguard.a
 	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$(filter %.o %.a,$$^) -lgcc
 $(TARGET_TESTS)/$(1)/node.ok: $(TARGET_TESTS)/$(1)/node
-	@$$(call target_run,$(1),$$<) >$$<.log 2>$$<.err && grep -q 'tell the story$$$$' $$<.log && touch $$@ && echo "  ok  $$<" || \
+	@$$(call target_run,$(3),$$<) >$$<.log 2>$$<.err && grep -q 'tell the story$$$$' $$<.log && touch $$@ && echo "  ok  $$<" || \
 	    { cat $$<.log $$<.err; echo "FAILED $$<"; exit 1; }
 endef
-$(foreach t,$(RUN_TARGETS),$(eval $(call target_tests,$(t),$(LIBC_$(t)))))
+$(foreach b,$(RUN_BUILDS),$(eval $(call target_tests,$(b),$(LIBC_$(call target_of,$(b))),$(call target_of,$(b)),$(call real_of,$(b)))))
 
 SEEDED := cortex_m4f
-$(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWARE)/$(SEEDED)/image.ok $(TARGET_TESTS)/$(SEEDED)/corpus.ok
+$(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWARE)/$(SEEDED)/image.ok $(FIRMWARE)/$(SEEDED)-q31/image.ok $(TARGET_TESTS)/$(SEEDED)/corpus.ok
 	@COMPILE='$(call cross_cc,$(SEEDED)) $(FREESTANDING) $(WARN) $(INCLUDE)' LINK='$(call cross_cc,$(SEEDED)) $(call image_link,$(SEEDED)) -nostdlib' \
 	    RUN='env QEMU_AUDIO_DRV=none $(RUN_$(SEEDED))' tests/target/seeded $(CROSS_$(SEEDED)) $(ENDIAN_$(SEEDED)) $(FIRMWARE)/$(SEEDED) $(TARGET_TESTS)/$(SEEDED)
 	@touch $@
@@ -86,7 +94,8 @@ $(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWA
 define target_unit
 .PHONY: target-unit-$(1)
 target-unit-$(1): $(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%.ok)
-$(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%): $(TARGET_TESTS)/$(1)/%: $(TARGET_TESTS)/$(1)/tests/unit/%.o $(call target_objects,$(1),$(CONSOLE_$(2)) $(CMOCKA_$(2))) $(filter-out %/memory.o,$(call target_start,$(1))) $(FIRMWARE)/$(1)/libhullguard.a
+$(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%): hal/start/image.ld
+$(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%): $(TARGET_TESTS)/$(1)/%: $(TARGET_TESTS)/$(1)/tests/unit/%.o $(call target_objects,$(1),$(CONSOLE_$(2)) $(CMOCKA_$(2))) $(filter-out %/memory.o,$(call target_start,$(1),$(1))) $(FIRMWARE)/$(1)/libhullguard.a
 	$$(Q)$$(call cross_cc,$(1)) $$(call UNIT_LINK_$(2),$$(call unit_board,$(1),$$@)) -o $$@ $$(filter %.o %.a,$$^) -lm
 $(UNIT_TESTS:%=$(TARGET_TESTS)/$(1)/%.ok): %.ok: %
 	@$$(call target_run,$$(call unit_board,$(1),$$<),$$<) >$$<.log 2>$$<.err && \
