@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from hullguard.codegen.c import emit_c
+from hullguard.codegen.config import emit_config
 from hullguard.codegen.dbc import emit_dbc
 from hullguard.design.design import Design
 
-__all__ = ["emit_c", "emit_dbc", "write_all"]
+__all__ = ["emit_c", "emit_config", "emit_dbc", "write_all"]
 
 
 def write_all(design: Design, out_dir: Path) -> tuple[Path, ...]:
-    """Write NAME.h, NAME.c and NAME.dbc; a file that already holds the same bytes is left alone, so that nothing is rebuilt for it.
+    """Write NAME.h, NAME.c, NAME_config.h and NAME.dbc; a file that already holds the same bytes is left alone, so that nothing is rebuilt for it.
 
     Returns the files that changed.
     """
@@ -20,7 +21,7 @@ def write_all(design: Design, out_dir: Path) -> tuple[Path, ...]:
     header, source = emit_c(design)
     changed = []
     out_dir.mkdir(parents=True, exist_ok=True)
-    for suffix, text in ((".h", header), (".c", source), (".dbc", emit_dbc(design))):
+    for suffix, text in ((".h", header), (".c", source), ("_config.h", emit_config(design)), (".dbc", emit_dbc(design))):
         path, data = out_dir / (name + suffix), text.encode("ascii")
         if not path.is_file() or path.read_bytes() != data:
             path.write_bytes(data)

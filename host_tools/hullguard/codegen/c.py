@@ -140,21 +140,31 @@ def _strings(macro: str, names: Sequence[str]) -> list[str]:
     return [f"#define {macro} \\", *(f"    {line} \\" for line in lines[:-1]), f"    {lines[-1]}"]
 
 
-def _limits(tables: Tables) -> list[str]:
+def limits(tables: Tables) -> tuple[tuple[str, int], ...]:
+    """Options of config.h that bound a model, and the least that this one needs; config.h allows no less than 1."""
     needed = (
         ("HG_GROUPS_MAX", len(tables.groups)),
         ("HG_GROUP_SIGNALS_MAX", max(len(g.signals) for g in tables.groups)),
         ("HG_LEVELS_MAX", max(g.levels for g in tables.groups)),
         ("HG_GENERATORS_MAX", tables.judged),
     )
+    return tuple((macro, max(least, 1)) for macro, least in needed)
+
+
+def parts(tables: Tables) -> tuple[tuple[str, bool], ...]:
+    """Options of config.h that leave a part out, and whether this model needs it."""
+    used = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch))
+    return tuple((f"HG_WITH_{part}", bool(there)) for part, there in used)
+
+
+def _limits(tables: Tables) -> list[str]:
     lines = []
-    for macro, least in needed:
-        if least > 1:  # config.h allows no less than 1
+    for macro, least in limits(tables):
+        if least > 1:
             lines += [f"#if {macro} < {least}U", f'#error "model {tables.name} needs {macro} of at least {least}"', "#endif"]
-    parts = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch))
-    for part, used in parts:
+    for macro, used in parts(tables):
         if used:
-            lines += [f"#if !HG_WITH_{part}", f'#error "model {tables.name} needs HG_WITH_{part}"', "#endif"]
+            lines += [f"#if !{macro}", f'#error "model {tables.name} needs {macro}"', "#endif"]
     if tables.fixed is None:
         reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
         lines += ["#if HG_REAL_Q31", f'#error "{reason}"', "#endif"]
