@@ -183,7 +183,7 @@ def main() -> int:
     grown, shrunk = judged(sizes, budget)
     print("".join(f"{line}\n" for line in shrunk + grown), file=sys.stderr, end="")
     if not grown:
-        print(f"  ok  sizes of {len(sizes)} programs are within {args.budget}", file=sys.stderr if args.json else sys.stdout)
+        print(f"  ok  sizes of {len(sizes)} programs are within {args.budget}", file=sys.stderr if args.json or args.format == "markdown" else sys.stdout)
     return 1 if grown else 0
 
 
