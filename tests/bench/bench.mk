@@ -55,20 +55,22 @@ $(BENCH_MODELS:%=$(BENCH)/%_record.h): $(BENCH)/%_record.h: $(RECORDER) tests/be
 	@mkdir -p $(@D)
 	$(Q)$(PY) $(RECORDER) $(call bench_source,$*) $* $@ $(call bench_words,$*)
 
-# The library once more for every target and number type, with what the compiler knows of stack and calls beside each object.
+# The library once more for every target, number type and model, as an integrator of that model builds it: with what it needs, by its
+# NAME_config.h; and with what the compiler knows of stack and calls beside each object.
 BENCH_FLAGS        := -fstack-usage -fcallgraph-info=su
 BENCH_CONSOLE_none := tests/target/console_semihosting.c hal/semihosting/semihosting.c
 BENCH_LINK_glibc    = -static -no-pie
 BENCH_LINK_none     = $(call image_link,$(1)) -nostdlib
 bench_libc     = $(if $(filter glibc,$(LIBC_$(1))),glibc,none)
 bench_cc       = $(CROSS_$(1))gcc $(MACHINE_$(1)) $(REAL_FLAG_$(2)) $(FREESTANDING) $(BENCH_FLAGS)
+bench_model    = $(call bench_cc,$(1),$(2)) -DHG_CONFIG_HEADER='"$(call bench_source,$(3))_config.h"' -I$(dir $(call bench_tables,$(3)))
 bench_hosted   = $(CROSS_$(1))gcc $(MACHINE_$(1)) $(OPTIMISE)
 bench_objects  = $(addprefix $(BENCH)/$(1)/,$(addsuffix .o,$(basename $(2))))
 bench_start    = $(if $(filter none,$(call bench_libc,$(1))),$(START_$(1)) $(IMAGE_SRC) $(BENCH_CONSOLE_none),tests/target/console_libc.c)
 
 # $(call bench_target,TARGET,REAL)
 define bench_target
-$(eval $(call objects,$(BENCH)/$(1)-$(2),$(LIB_SRC) $(IMAGE_SRC) $(BENCH_CONSOLE_none) $(filter %.c,$(START_$(1))),$$(call bench_cc,$(1),$(2)) -Itests/target))
+$(eval $(call objects,$(BENCH)/$(1)-$(2),$(IMAGE_SRC) $(BENCH_CONSOLE_none) $(filter %.c,$(START_$(1))),$$(call bench_cc,$(1),$(2)) -Itests/target))
 $(eval $(call objects,$(BENCH)/$(1)-$(2),tests/target/console_libc.c,$$(call bench_hosted,$(1))))
 $(eval $(call assembly,$(BENCH)/$(1)-$(2),$(filter %.S,$(START_$(1))),$$(call bench_cc,$(1),$(2))))
 $(BENCH)/$(1)-$(2)/hal/start/memory.o: FREESTANDING += -fno-tree-loop-distribute-patterns
@@ -77,14 +79,16 @@ endef
 
 # $(call bench_drive,TARGET,REAL,MODEL)
 define bench_drive
+$(eval $(call objects,$(BENCH)/$(1)-$(2)/$(3),$(LIB_SRC),$$(call bench_model,$(1),$(2),$(3))))
+$(LIB_SRC:%.c=$(BENCH)/$(1)-$(2)/$(3)/%.o): | $(call bench_tables,$(3))
 OBJECTS += $(BENCH)/$(1)-$(2)/$(3)/drive.o $(BENCH)/$(1)-$(2)/$(3)/tables.o
 $(BENCH)/$(1)-$(2)/$(3)/tables.o: $(call bench_tables,$(3)) Makefile
 	@mkdir -p $$(@D)
-	$$(Q)$$(call bench_cc,$(1),$(2)) $$(WARN) -I$(dir $(call bench_tables,$(3))) $$(INCLUDE) $$(DEPEND) -c $$< -o $$@
+	$$(Q)$$(call bench_model,$(1),$(2),$(3)) $$(WARN) $$(INCLUDE) $$(DEPEND) -c $$< -o $$@
 $(BENCH)/$(1)-$(2)/$(3)/drive.o: tests/bench/drive.c $(BENCH)/$(3)_record.h Makefile
 	@mkdir -p $$(@D)
-	$$(Q)$$(call bench_cc,$(1),$(2)) $$(WARN) -I$(dir $(call bench_tables,$(3))) $$(INCLUDE) -Itests/target $$(DEPEND) -include $(BENCH)/$(3)_record.h -c $$< -o $$@
-$(BENCH)/$(1)-$(2)/$(3)/drive.elf: $(call bench_objects,$(1)-$(2),$(3)/drive.o $(3)/tables.o $(LIB_SRC) $(call bench_start,$(1))) hal/start/image.ld
+	$$(Q)$$(call bench_model,$(1),$(2),$(3)) $$(WARN) $$(INCLUDE) -Itests/target $$(DEPEND) -include $(BENCH)/$(3)_record.h -c $$< -o $$@
+$(BENCH)/$(1)-$(2)/$(3)/drive.elf: $(call bench_objects,$(1)-$(2),$(3)/drive.o $(3)/tables.o $(LIB_SRC:%=$(3)/%) $(call bench_start,$(1))) hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call BENCH_LINK_$(call bench_libc,$(1)),$(1)) -Wl,-Map=$$(@:.elf=.map) -o $$@ $$(filter %.o,$$^) -lgcc
 .PHONY: bench-step-$(1)-$(3)-$(2)
 bench-step-$(1)-$(3)-$(2): $(BENCH)/$(1)-$(2)/$(3)/drive.elf $(BENCH)/count.so

@@ -20,7 +20,7 @@ define painted_target
 $(eval $(call objects,$(BENCH)/$(1)-f32,tests/bench/painted.c,$$(call bench_cc,$(1),f32) -Itests/target))
 $(BENCH)/$(1)-f32/platoon/driven.o: $(BENCH)/$(1)-f32/platoon/drive.o
 	$$(Q)$(CROSS_$(1))objcopy --redefine-sym main=drive_main $$< $$@
-$(BENCH)/$(1)-f32/platoon/painted.elf: $(call bench_objects,$(1)-f32,tests/bench/painted.c platoon/driven.o platoon/tables.o $(LIB_SRC) $(call bench_start,$(1))) hal/start/image.ld
+$(BENCH)/$(1)-f32/platoon/painted.elf: $(call bench_objects,$(1)-f32,tests/bench/painted.c platoon/driven.o platoon/tables.o $(LIB_SRC:%=platoon/%) $(call bench_start,$(1))) hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call BENCH_LINK_none,$(1)) -Wl,-Map=$$(@:.elf=.map) -o $$@ $$(filter %.o,$$^) -lgcc
 endef
 $(foreach t,$(PAINTED),$(eval $(call painted_target,$(t))))

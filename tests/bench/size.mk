@@ -7,11 +7,6 @@ SIZE_PARTS := detector node sensor
 # The part of it in `make test`: two instruction sets, with an FPU and without.
 SIZE_QUICK := cortex_m4f rv32imac
 
-SIZE_CHOICE       := ZONOTOPE BANK PREDICT MISMATCH
-WITH_platoon_bank := BANK
-SIZE_SETS         := $(sort $(foreach m,$(MODELS),with_$(WITH_$(m))))
-size_flags         = $(foreach w,$(filter-out $(1:with_%=%),$(SIZE_CHOICE)),-DHG_WITH_$(w)=0)
-
 size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(MODELS),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
 size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
 size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '$(call size_cross,$(1))' $(2) $(call size_elfs,$(1))
@@ -30,13 +25,12 @@ define size_program
 OBJECTS += $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o
 $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o: tests/bench/size_$(4).c $(BENCH)/$(3)_record.h Makefile
 	@mkdir -p $$(@D)
-	$$(Q)$$(call bench_cc,$(1),$(2)) $(call size_flags,with_$(WITH_$(3))) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
-$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(call bench_objects,$(1)-$(2),$(3)/size_$(4).o $(LIB_SRC:%=with_$(WITH_$(3))/%) $(if $(filter detector,$(4)),,$(3)/tables.o) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c) hal/start/image.ld
+	$$(Q)$$(call bench_model,$(1),$(2),$(3)) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
+$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(call bench_objects,$(1)-$(2),$(3)/size_$(4).o $(LIB_SRC:%=$(3)/%) $(if $(filter detector,$(4)),,$(3)/tables.o) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c) hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -Wl,-Map=$$(@:.elf=.map) -nostdlib -o $$@ $$(filter %.o,$$^) -lgcc
 endef
 
 define size_target
-$(foreach s,$(SIZE_SETS),$(eval $(call objects,$(BENCH)/$(1)-$(2)/$(s),$(LIB_SRC),$$(call bench_cc,$(1),$(2)) $(call size_flags,$(s)))))
 $(eval $(call objects,$(BENCH)/$(1)-$(2),tests/bench/size_port.c,$$(call bench_cc,$(1),$(2))))
 $(foreach m,$(MODELS),$(foreach p,$(SIZE_PARTS),$(eval $(call size_program,$(1),$(2),$(m),$(p)))))
 endef

@@ -153,7 +153,7 @@ def test_the_bound_is_one(target: str, cross: str, emulator: str) -> None:
     said = count(elf, cross, emulator, BENCH / "count.so")[0]
     used = int(said.splitlines()[-1].removeprefix("stack "), 16)
     objects = BENCH / f"{target}-f32"
-    graph = compiled([elf.with_name("drive.ci"), elf.with_name("tables.ci"), *objects.glob("firmware/src/*.ci"), *objects.glob("hal/*/*.ci"), *objects.glob("tests/target/*.ci")])
+    graph = compiled([elf.with_name("drive.ci"), elf.with_name("tables.ci"), *elf.parent.glob("firmware/src/*.ci"), *objects.glob("hal/*/*.ci"), *objects.glob("tests/target/*.ci")])
     painter = compiled([objects / "tests/bench/painted.ci"])["main"].bytes
     bound = deepest("main", graph, run_time(elf, cross, symbols(elf, cross)))[0]
     assert painter is not None
