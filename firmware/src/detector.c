@@ -380,28 +380,25 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
 /* Close the sample in every hold; radii of the past are corrected where a loss has just shown. */
 static void step_holds(hg_detector *self, hg_evidence *evidence)
 {
-    uint8_t rewind[HG_GROUPS_MAX];
+    const hg_detector_config *config = self->config;
     uint8_t first = 0U;
     self->radius = hg_ring_open(&self->radii);
-    for (uint8_t i = 0U; i < self->config->groups; i++) {
+    for (uint8_t i = 0U; i < config->groups; i++) {
         hg_hold *hold = &self->memory.hold[i];
-        hg_hold_step(hold, &self->value[first], &self->radius[first], &rewind[i]);
+        uint8_t rewind;
+        hg_hold_step(hold, &self->value[first], &self->radius[first], &rewind);
         if (hg_hold_doubt(hold)) {
             evidence->doubt |= (uint8_t)(1U << i);
         }
-        if (rewind[i] > 0U) {
+        if (rewind > 0U) {
             evidence->rewound |= (uint8_t)(1U << i);
+            for (uint8_t lag = 1U; (lag <= rewind) && (lag < config->history); lag++) {
+                widen_past(self, i, first, lag);
+            }
         }
-        first += hold->config->trigger->width;
+        first += config->hold[i].trigger->width;
     }
     derive(self, evidence->doubt);
-    first = 0U;
-    for (uint8_t i = 0U; i < self->config->groups; i++) {
-        for (uint8_t lag = 1U; (lag <= rewind[i]) && (lag < self->config->history); lag++) {
-            widen_past(self, i, first, lag);
-        }
-        first += self->config->hold[i].trigger->width;
-    }
 }
 
 static void refuse(hg_detector *self)

@@ -49,6 +49,8 @@ hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *co
     self->age = UINT8_MAX;
     self->good = 0U;
     self->level = 0U;
+    self->silence = 0U;
+    self->holes = true;
     self->seen = false;
     self->recovering = false;
     self->fresh = false;
@@ -98,16 +100,21 @@ hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
     const bool whole = continues && (!self->lost) && (self->good > 0U);
     self->gap = self->doubt && (!whole);
     self->gap_age = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
+    bool holes = false;
     for (uint8_t g = 0U; g < trigger->width; g++) {
         self->previous[g] = self->sent[g];
         self->sent[g] = code[g];
+        holes = holes || (code[g] == HG_CODE_INVALID);
     }
+    self->holes = holes;
     self->recovering = self->seen && (!whole);
     self->seen = true;
     self->good = whole ? GOOD_IN_ROW : 1U;
     self->level = whole ? hg_trigger_level(trigger, self->sent, self->previous) : 0U;
+    /* Until the next frame, or until one is known to be lost and nothing is promised. */
+    self->silence = silence(self);
     for (uint8_t g = 0U; g < trigger->width; g++) {
-        self->promise[g] = threshold(self, g); /* until the next frame, or until one is known to be lost and nothing is promised */
+        self->promise[g] = threshold(self, g);
     }
     self->lost = false;
     self->fresh = true;
@@ -124,11 +131,51 @@ static const hg_real *slew(const hg_hold_config *config, uint8_t age)
     return &config->slew[((uint32_t)age - 1U) * config->trigger->width];
 }
 
+/* The last value, and how far the true one can be from it by now. */
+static void set_slewed(const hg_hold *self, const hg_real *moved, hg_real *value, hg_real *radius)
+{
+    const hg_code_scale *scale = self->config->scale;
+    const uint8_t width = self->config->trigger->width;
+    for (uint8_t g = 0U; g < width; g++) {
+        value[g] = hg_code_value(&scale[g], self->sent[g]);
+        radius[g] = moved[g];
+    }
+}
+
+/* The same of signals without a value. */
+static void set_unknown(const hg_hold *self, hg_real *value, hg_real *radius)
+{
+    const hg_hold_config *config = self->config;
+    for (uint8_t g = 0U; g < config->trigger->width; g++) {
+        if (self->sent[g] == HG_CODE_INVALID) {
+            value[g] = config->middle[g];
+            radius[g] = config->span[g];
+        }
+    }
+}
+
+/* The sender would have spoken if the true value were further away than it promised. Was a radius made smaller by that? */
+static bool rely_on_silence(const hg_hold *self, bool trusted, hg_real *radius)
+{
+    const hg_hold_config *config = self->config;
+    const hg_code_scale *scale = config->scale;
+    const uint8_t width = config->trigger->width;
+    bool relied = false;
+    for (uint8_t g = 0U; g < width; g++) {
+        const hg_real promised = hg_real_add(hg_real_of_code(scale[g].resolution, scale[g].exponent, self->promise[g]), config->half[g]);
+        /* What is not to be trusted is compared as well, with 0: a sample costs the same with a frame and without. */
+        const hg_real limit = (trusted && (self->sent[g] != HG_CODE_INVALID)) ? radius[g] : HG_REAL_ZERO;
+        const bool tighter = promised < limit;
+        radius[g] = tighter ? promised : radius[g];
+        relied = relied || tighter;
+    }
+    return relied;
+}
+
 void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewind)
 {
     const hg_hold_config *config = self->config;
     const bool was_in_doubt = self->doubt;
-    bool conditional = false;
     if (self->fresh) {
         self->age = 0U;
     } else if (self->age < UINT8_MAX) {
@@ -143,27 +190,14 @@ void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewin
     if (self->lost) {
         self->good = 0U;
     }
-    /* Silence is weighed whether it is to be trusted or not: a sample costs the same with a frame and without. */
     const bool held = (!stale) && (!self->fresh);
-    const bool trusted = held && (!self->lost) && (self->age > silence(self));
-    const bool silent = config->trigger->interval_max > 1U; /* ever */
-    const uint8_t width = config->trigger->width;
-    const hg_real *half = config->half;
-    const hg_real *moved = held ? slew(config, self->age) : half;
-    const hg_code_scale *scale = config->scale;
-    const int32_t *sent = self->sent;
-    const int32_t *promise = self->promise;
-    for (uint8_t g = 0U; g < width; g++) {
-        const bool known = sent[g] != HG_CODE_INVALID;
-        hg_real widest = (stale || (!known)) ? config->span[g] : moved[g];
-        value[g] = known ? hg_code_value(&scale[g], sent[g]) : config->middle[g];
-        if (silent) {
-            const hg_real promised = hg_real_add(hg_real_of_code(scale[g].resolution, scale[g].exponent, promise[g]), half[g]);
-            const bool tighter = trusted && known && (promised < widest);
-            conditional = conditional || tighter;
-            widest = tighter ? promised : widest;
-        }
-        radius[g] = widest;
+    set_slewed(self, stale ? config->span : (held ? slew(config, self->age) : config->half), value, radius);
+    if (self->holes) {
+        set_unknown(self, value, radius);
+    }
+    bool conditional = false;
+    if (config->trigger->interval_max > 1U) { /* else the sender is never silent */
+        conditional = rely_on_silence(self, held && (!self->lost) && (self->age > self->silence), radius);
     }
     const bool newly_lost = was_in_doubt && self->lost && (!self->fresh);
     if (newly_lost) {
@@ -183,11 +217,6 @@ void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius)
     for (uint8_t g = 0U; g < config->trigger->width; g++) {
         radius[g] = (held[g] == HG_CODE_INVALID) ? config->span[g] : slew(config, (uint8_t)(self->gap_age - lag))[g];
     }
-}
-
-bool hg_hold_doubt(const hg_hold *self)
-{
-    return self->doubt;
 }
 
 uint8_t hg_hold_age(const hg_hold *self)

@@ -54,22 +54,12 @@ typedef struct {
 /* One radius, with weights that follow one another. Returns the next of them. */
 static inline const hg_real *add_radius(hg_pair *sum, const hg_real *weight, hg_real radius, bool two)
 {
-    sum->first = hg_acc_mac(sum->first, weight[0], radius);
+    sum->first = hg_acc_mac(sum->first, *weight, radius);
+    weight++;
     if (two) {
-        sum->second = hg_acc_mac(sum->second, weight[1], radius);
+        sum->second = hg_acc_mac(sum->second, *weight, radius);
+        weight++;
     }
-    return two ? &weight[2] : &weight[1];
-}
-
-/* `lags` radii, one a sample, back from this one on. */
-static inline const hg_real *add_lags(hg_pair *sum, const hg_real *weight, const hg_real *newest, uint8_t lags, uint8_t stride, bool two)
-{
-    const uint32_t end = (uint32_t)lags * stride;
-    hg_pair own = *sum;
-    for (uint32_t back = 0U; back < end; back += stride) {
-        weight = add_radius(&own, weight, *(newest - back), two);
-    }
-    *sum = own;
     return weight;
 }
 
@@ -77,20 +67,22 @@ static inline const hg_real *add_lags(hg_pair *sum, const hg_real *weight, const
 static inline const hg_real *add_signal(hg_pair *sum, hg_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal, uint8_t taps, bool two)
 {
     const uint8_t stride = ring->width;
-    const uint8_t rows = (uint8_t)(ring->newest + 1U); /* from the newest back to where the ring wraps */
-    const hg_real *newest = &ring->data[((uint16_t)ring->newest * stride) + signal];
-    const hg_real *leaving;
-    if (taps < rows) {
-        weight = add_lags(sum, weight, newest, taps, stride, two);
-        leaving = newest - ((uint16_t)taps * stride);
-    } else {
-        const hg_real *last = &ring->data[((uint16_t)(ring->length - 1U) * stride) + signal];
-        const uint8_t behind = (uint8_t)(taps - rows);
-        weight = add_lags(sum, weight, newest, rows, stride, two);
-        weight = add_lags(sum, weight, last, behind, stride, two);
-        leaving = last - ((uint16_t)behind * stride);
+    const hg_real *radius = &ring->data[((uint16_t)ring->newest * stride) + signal];
+    uint8_t lags = taps;
+    if (taps > ring->newest) { /* the ring wraps behind its first row */
+        for (uint8_t lag = 0U; lag < ring->newest; lag++) {
+            weight = add_radius(sum, weight, *radius, two);
+            radius -= stride;
+        }
+        weight = add_radius(sum, weight, *radius, two);
+        radius = &ring->data[((uint16_t)(ring->length - 1U) * stride) + signal];
+        lags = (uint8_t)(taps - ring->newest - 1U);
     }
-    return add_radius(tail, weight, *leaving, two);
+    for (; lags > 0U; lags--) {
+        weight = add_radius(sum, weight, *radius, two);
+        radius -= stride;
+    }
+    return add_radius(tail, weight, *radius, two);
 }
 
 /* What the initial state and the disturbances add at this sample; what is left of the initial state goes over into theta. */
@@ -112,18 +104,24 @@ static const hg_real *bias_step(hg_hull *self)
     return bias;
 }
 
-/* The bound on all lags behind the taps moves on by one sample. */
-static hg_real move_tail(hg_hull *self, uint8_t i, hg_acc leaving)
+/* The same of all signals. */
+static inline const hg_real *add_signals(hg_pair *sum, hg_pair *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
 {
-    const hg_real kept = hg_real_mul(self->config->decay[i], self->theta[i]);
-    /* Held finite: an infinite theta would never heal. */
-    self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(leaving, self->config->exponent)), HG_REAL_MAX);
-    return self->theta[i];
+    const hg_real *next = weight;
+    for (uint8_t g = 0U; g < config->width; g++) {
+        next = add_signal(sum, tail, next, ring, config->signal[g], config->taps[g], two);
+    }
+    return next;
 }
 
-static hg_real whole(const hg_hull *self, hg_acc sum, hg_real bias, hg_real theta)
+/* The bound on all lags behind the taps moves on by one sample. Returns J. */
+static hg_real finish(hg_hull *self, uint8_t i, hg_acc sum, hg_acc leaving, hg_real bias)
 {
-    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(sum, self->config->exponent)), theta), HG_REAL_MAX);
+    const int8_t exponent = self->config->exponent;
+    const hg_real kept = hg_real_mul(self->config->decay[i], self->theta[i]);
+    /* Held finite: an infinite theta would never heal. */
+    self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(leaving, exponent)), HG_REAL_MAX);
+    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(sum, exponent)), self->theta[i]), HG_REAL_MAX);
 }
 
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
@@ -131,30 +129,15 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
     const hg_hull_config *config = self->config;
     const hg_real *weight = config->weight;
     const hg_real *bias = bias_step(self);
-    uint8_t i = 0U;
-    while ((uint8_t)(i + 1U) < config->residuals) {
+    for (uint16_t i = 0U; i < config->residuals; i += 2U) {
+        const bool two = (i + 1U) < config->residuals;
         hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
         hg_pair tail = sum;
-        for (uint8_t g = 0U; g < config->width; g++) {
-            weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], true);
+        weight = two ? add_signals(&sum, &tail, weight, ring, config, true) : add_signals(&sum, &tail, weight, ring, config, false);
+        J[i] = finish(self, (uint8_t)i, sum.first, tail.first, bias[i]);
+        if (two) {
+            J[i + 1U] = finish(self, (uint8_t)(i + 1U), sum.second, tail.second, bias[i + 1U]);
         }
-        J[i] = whole(self, sum.first, bias[i], move_tail(self, i, tail.first));
-        J[i + 1U] = whole(self, sum.second, bias[i + 1U], move_tail(self, (uint8_t)(i + 1U), tail.second));
-        i += 2U;
-    }
-    if (i < config->residuals) {
-        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
-        hg_pair tail = sum;
-        for (uint8_t g = 0U; g < config->width; g++) {
-            weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], false);
-        }
-        J[i] = whole(self, sum.first, bias[i], move_tail(self, i, tail.first));
     }
     self->k = (self->k < UINT16_MAX) ? (uint16_t)(self->k + 1U) : UINT16_MAX;
-}
-
-bool hg_hull_ready(const hg_hull *self)
-{
-    const uint16_t needed = (self->how == HG_START_REST) ? self->config->ready_rest : self->config->ready_moving;
-    return self->k >= needed;
 }

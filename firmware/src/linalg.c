@@ -8,30 +8,45 @@ typedef struct {
     hg_acc second;
 } hg_pair;
 
-static inline void add_rows(hg_pair *sum, const hg_real *first, const hg_real *second, const hg_real *x, uint8_t cols)
+/* Two rows from here on. Returns the next ones. */
+static inline const hg_real *add_rows(hg_pair *sum, const hg_real *first, const hg_real *x, uint8_t cols)
+{
+    const hg_real *const end = &first[cols];
+    const hg_real *second = end;
+    while (first != end) {
+        sum->first = hg_acc_mac(sum->first, *first, *x);
+        sum->second = hg_acc_mac(sum->second, *second, *x);
+        first++;
+        second++;
+        x++;
+    }
+    return second;
+}
+
+static inline hg_acc add_row(hg_acc sum, const hg_real *row, const hg_real *x, uint8_t cols)
 {
     for (uint8_t j = 0U; j < cols; j++) {
-        sum->first = hg_acc_mac(sum->first, first[j], x[j]);
-        sum->second = hg_acc_mac(sum->second, second[j], x[j]);
+        sum = hg_acc_mac(sum, row[j], x[j]);
     }
+    return sum;
 }
 
 void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, const hg_real *y, hg_real *out)
 {
     const hg_real *a = m->data;
     const hg_real *b = n->data;
-    for (uint8_t i = 0U; i < m->rows; i += 2U) {
-        /* An odd last row goes twice, once for nothing: the cost does not depend on where it is. */
-        const bool two = (uint8_t)(i + 1U) < m->rows;
+    const uint8_t rows = m->rows;
+    uint8_t i = 0U;
+    while ((uint8_t)(i + 1U) < rows) {
         hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
-        add_rows(&sum, a, two ? &a[m->cols] : a, x, m->cols);
-        add_rows(&sum, b, two ? &b[n->cols] : b, y, n->cols);
+        a = add_rows(&sum, a, x, m->cols);
+        b = add_rows(&sum, b, y, n->cols);
         out[i] = hg_acc_real(sum.first, m->exponent);
-        if (two) {
-            out[i + 1U] = hg_acc_real(sum.second, m->exponent);
-            a = &a[2U * (uint16_t)m->cols];
-            b = &b[2U * (uint16_t)n->cols];
-        }
+        out[i + 1U] = hg_acc_real(sum.second, m->exponent);
+        i += 2U;
+    }
+    if (i < rows) {
+        out[i] = hg_acc_real(add_row(add_row(hg_acc_zero(), a, x, m->cols), b, y, n->cols), m->exponent);
     }
 }
 

@@ -1,6 +1,7 @@
-# Cortex-M4F: single-precision FPU. QEMU's mps2-an386.
+# Cortex-M4F: single-precision FPU. QEMU's mps2-an386. Tuned for this core gcc does without vmla.f32, which rounds as vmul and vadd do; with it a
+# detector step is a tenth fewer instructions. ARM's manual has 3 cycles for it and 1 for either of the two: for speed on silicon measure both.
 CROSS_cortex_m4f     := arm-none-eabi-
-MACHINE_cortex_m4f   := -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard
+MACHINE_cortex_m4f   := -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard -mtune=generic-armv7-a
 INTEGER_cortex_m4f   := -mgeneral-regs-only
 REAL_cortex_m4f      := f32
 ENDIAN_cortex_m4f    := little

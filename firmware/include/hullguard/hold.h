@@ -48,6 +48,8 @@ typedef struct {               /* RAM: one a group */
     uint8_t               age;       /* samples since the last good frame, saturated */
     uint8_t               good;      /* good frames in a row: 0 none yet, 1, or 2 */
     uint8_t               level;     /* of the trigger, known when good is 2 */
+    uint8_t               silence;   /* samples since that frame in which the sender may not look */
+    bool                  holes;     /* a signal has no value: it was sent as invalid, or nothing was sent */
     bool                  seen;      /* has there been a good frame? */
     bool                  recovering; /* the last good frame came after a loss */
     bool                  fresh;     /* a good frame arrived for the open sample */
@@ -91,7 +93,10 @@ void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewin
 void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius);
 
 /** Does a radius since the last good frame rely on the sender's silence? */
-bool hg_hold_doubt(const hg_hold *self);
+static inline bool hg_hold_doubt(const hg_hold *self)
+{
+    return self->doubt;
+}
 
 /** Samples since the last good frame as of the last step, 0 in the sample of a frame; saturates at 255, as does never. */
 uint8_t hg_hold_age(const hg_hold *self);

@@ -75,6 +75,9 @@ void hg_hull_reset(hg_hull *self, hg_start how);
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J);
 
 /** Has the initial state become a small part of J? */
-bool hg_hull_ready(const hg_hull *self);
+static inline bool hg_hull_ready(const hg_hull *self)
+{
+    return self->k >= ((self->how == HG_START_REST) ? self->config->ready_rest : self->config->ready_moving);
+}
 
 #endif
