@@ -72,7 +72,7 @@ static inline const hg_real *add_signal(hg_pair *sum, hg_pair *tail, const hg_re
     if (taps > ring->newest) { /* the ring wraps behind its first row */
         for (uint8_t lag = 0U; lag < ring->newest; lag++) {
             weight = add_radius(sum, weight, *radius, two);
-            radius -= stride;
+            radius = radius - stride;
         }
         weight = add_radius(sum, weight, *radius, two);
         radius = &ring->data[((uint16_t)(ring->length - 1U) * stride) + signal];
@@ -80,7 +80,7 @@ static inline const hg_real *add_signal(hg_pair *sum, hg_pair *tail, const hg_re
     }
     for (; lags > 0U; lags--) {
         weight = add_radius(sum, weight, *radius, two);
-        radius -= stride;
+        radius = radius - stride;
     }
     return add_radius(tail, weight, *radius, two);
 }

@@ -11,16 +11,17 @@ typedef struct {
 /* Two rows from here on. Returns the next ones. */
 static inline const hg_real *add_rows(hg_pair *sum, const hg_real *first, const hg_real *x, uint8_t cols)
 {
-    const hg_real *const end = &first[cols];
-    const hg_real *second = end;
-    while (first != end) {
-        sum->first = hg_acc_mac(sum->first, *first, *x);
-        sum->second = hg_acc_mac(sum->second, *second, *x);
-        first++;
-        second++;
-        x++;
+    const hg_real *upper = first;
+    const hg_real *lower = &first[cols];
+    const hg_real *value = x;
+    for (uint8_t left = cols; left > 0U; left--) {
+        sum->first = hg_acc_mac(sum->first, *upper, *value);
+        sum->second = hg_acc_mac(sum->second, *lower, *value);
+        upper++;
+        lower++;
+        value++;
     }
-    return second;
+    return lower;
 }
 
 static inline hg_acc add_row(hg_acc sum, const hg_real *row, const hg_real *x, uint8_t cols)

@@ -24,6 +24,12 @@ void hg_ring_reset(hg_ring *self)
     }
 }
 
+hg_real *hg_ring_open(hg_ring *self)
+{
+    self->newest = ((self->newest + 1U) < self->length) ? (uint8_t)(self->newest + 1U) : 0U;
+    return &self->data[(uint16_t)self->newest * self->width];
+}
+
 hg_status hg_ring_push(hg_ring *self, const hg_real *row)
 {
     if (!hg_linalg_finite(row, self->width)) {

@@ -29,11 +29,7 @@ hg_status hg_ring_start(hg_ring *self, uint8_t width, uint8_t length, hg_real *m
 void hg_ring_reset(hg_ring *self);
 
 /** Begin a new sample. Result: [width], where the oldest was; to be filled with finite numbers before the ring is read. Constant time. */
-static inline hg_real *hg_ring_open(hg_ring *self)
-{
-    self->newest = ((self->newest + 1U) < self->length) ? (uint8_t)(self->newest + 1U) : 0U;
-    return &self->data[(uint16_t)self->newest * self->width];
-}
+hg_real *hg_ring_open(hg_ring *self);
 
 /** Enter a new sample.
  *  @param[in] row  [width]
