@@ -107,6 +107,15 @@ def emit(args: argparse.Namespace, result: dict[str, Any]) -> None:
 # ---- design ----
 
 
+def fixed_point(made: Design) -> dict[str, Any]:
+    """Units of signals and residuals (numbers are times 2^unit) and what rounding adds to a threshold, or why there is none."""
+    fixed = made.tables.fixed
+    if fixed is None:
+        return {"refused": made.tables.not_fixed}
+    names = [s.name for g in fixed.groups for s in g.signals]
+    return {"units": dict(zip(names, fixed.units, strict=False)), "residual_units": list(fixed.units[fixed.width :]), "rounding": list(made.fixed_rounding)}
+
+
 def matrices(made: Design) -> list[dict[str, Any]]:
     """Matrices of every generator by the names of the method note."""
     rows = []
@@ -180,13 +189,14 @@ def run_design(args: argparse.Namespace) -> int:
     for f in bank_facts(made):
         found = ", ".join(f"{made.model.faults[i].name} {v:.3g}" for i, v in zip(f.faults, f.smallest[:, 0], strict=True))
         say(args, f"  {f.name}: {f.table.certificates} certificates over {f.table.window} samples, smallest fault within {f.within[0]} samples: {found}")
+    say(args, "  fixed point: " + (made.tables.not_fixed or f"rounding is at most {100 * max(made.rounding_shares('q31'), default=0.0):.2g} % of a threshold"))
     say(args, f"model {model.name}, hash {made.tables.hash:08x}: tables, DBC and report in {out}" + ("" if own else f"; search kept in {beside.name}" if not overrides else ""))
     emit(args, {
         "model": model.name, "model_hash": f"{made.tables.hash:08x}", "out": str(out), "generators": matrices(made),
         "slews": {s.name: stored.slew[i].tolist() for i, s in enumerate(model.signals)},
         "state_range": stored.state_range.tolist(),
         "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "passed": c.passed} for c in made.checks],
-        "load_bound": made.load_bound, "reused": own, **as_json(made, pairs),
+        "load_bound": made.load_bound, "reused": own, "fixed_point": fixed_point(made), **as_json(made, pairs),
     })  # fmt: skip
     return 0
 

@@ -76,6 +76,12 @@ class Design:
         """Disturbances whose bounds are the radii of the uncertain states."""
         return varying_states(self.model.plant, self.uncertain)
 
+    def rounding_shares(self, real: str) -> list[float]:
+        """What rounding is of the usual threshold, a share a residual of the generators."""
+        steady = [float(x) for g in self.generators for x in g.tables.steady]
+        lost = self.fixed_rounding if real == "q31" else [float(x) for g in self.generators for x in g.tables.rounding]
+        return [x / J for x, J in zip(lost, steady, strict=False)]
+
     @property
     def judges(self) -> list[str]:
         """What generators and banks are called, in the order of the decision."""

@@ -91,6 +91,9 @@ def _summary(design: Design) -> Iterator[str]:
         yield f"<aside><p>{told}</p></aside>"
     tiles = [tile("checks", f"{passed} of {len(design.checks)}", "passed", "good" if passed == len(design.checks) else "bad")]
     tiles.append(tile("bus load, worst case", percent(design.load_bound), f"limit {percent(model.load_max)}", "good" if design.load_bound <= model.load_max else "bad"))
+    f32, q31 = (max(design.rounding_shares(real), default=0.0) for real in ("f32", "q31"))
+    if design.tables.fixed is not None and design.generators:
+        tiles.append(tile("rounding, fixed point", percent(q31), f"of a threshold; {percent(f32)} in float32"))
     best = _smallest(design)
     if best:
         name, size = max(best.items(), key=lambda kv: kv[1])
