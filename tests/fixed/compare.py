@@ -49,7 +49,7 @@ class Tally:
 
 @cache
 def _ready(name: str) -> tuple[Design, dict[str, Native], Array]:
-    made = design(load_model(name, None, "manoeuvres"))[0]
+    made = design(load_model(name))[0]
     lost32 = np.concatenate([g.tables.rounding for g in made.generators] + [np.zeros(len(made.tables.banks))])
     # The banks' rounding in float32 is a share of the bias; a thousandth of it is far more.
     for i, bank in enumerate(made.tables.banks):
