@@ -82,12 +82,13 @@ static void add_pair(hg_pair *pair, const hg_ring *ring, uint16_t at, uint8_t la
     const hg_real *weight = pair->weight;
     hg_acc first = pair->first;
     hg_acc second = pair->second;
+    uint16_t place = at;
     for (uint8_t left = lags; left > 0U; left--) {
-        const hg_real radius = ring->data[at];
+        const hg_real radius = ring->data[place];
         first = hg_acc_mac(first, weight[0], radius);
         second = hg_acc_mac(second, weight[1], radius);
         weight = &weight[2];
-        at = (uint16_t)(at - ring->width); /* wraps below 0 after the last one, which is not read then */
+        place = (uint16_t)(place - ring->width); /* wraps below 0 after the last one, which is not read then */
     }
     pair->weight = weight;
     pair->first = first;
@@ -96,10 +97,11 @@ static void add_pair(hg_pair *pair, const hg_ring *ring, uint16_t at, uint8_t la
 
 static void add_one(hg_pair *pair, const hg_ring *ring, uint16_t at, uint8_t lags)
 {
+    uint16_t place = at;
     for (uint8_t left = lags; left > 0U; left--) {
-        pair->first = hg_acc_mac(pair->first, *pair->weight, ring->data[at]);
+        pair->first = hg_acc_mac(pair->first, *pair->weight, ring->data[place]);
         pair->weight = &pair->weight[1];
-        at = (uint16_t)(at - ring->width);
+        place = (uint16_t)(place - ring->width);
     }
 }
 

@@ -308,6 +308,9 @@ static void contradicting_predictors_are_refused(void **state)
     p[0].input = derived;
     assert_refused(&c);
     p[0] = predict[0];
+    p[0].correct.exponent = 1; /* float tables are not scaled */
+    assert_refused(&c);
+    p[0] = predict[0];
     p[0].first = 1U; /* not where group 0 begins */
     assert_refused(&c);
     p[0] = predict[0];
@@ -337,6 +340,9 @@ static void a_contradicting_mismatch_is_refused(void **state)
     m.signal = derived;
     assert_refused(&c);
     m = mismatch;
+    m.exponent = 1; /* float tables are not scaled */
+    assert_refused(&c);
+    m = mismatch;
     m.states = 0U; /* one place is left over */
     assert_refused(&c);
 }
@@ -353,6 +359,9 @@ static void contradicting_banks_are_refused(void **state)
     assert_refused(&c);
     b[0] = bank[0];
     b[0].signal = derived; /* has no value that is kept */
+    assert_refused(&c);
+    b[0] = bank[0];
+    b[0].exponent = -1;
     assert_refused(&c);
     b[0] = bank[0];
     b[0].extra = outside;

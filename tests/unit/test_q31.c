@@ -4,6 +4,7 @@
 #include "support.h"
 
 #include "hullguard/code.h"
+#include "hullguard/frame.h"
 #include "hullguard/hold.h"
 #include "hullguard/hull.h"
 #include "hullguard/residual.h"
@@ -204,6 +205,24 @@ static void what_did_not_fit_has_no_code(void **state)
     assert_int_equal(HG_CODE_INVALID, hg_code_encode(&scale, HG_REAL_MAX)); /* 65536 codes */
     assert_int_equal(INT32_MAX, hg_code_value(&scale, INT32_MAX));
     assert_int_equal(-INT32_MAX, hg_code_value(&scale, INT32_MIN));
+}
+
+/* A float field has no place in an image without floats: the message is refused, and nothing of it would be believed. */
+static void a_float_field_is_refused(void **state)
+{
+    (void)state;
+    const hg_field field = {.start = 0U, .length = 32U, .flags = HG_FIELD_FLOAT32};
+    const hg_code_scale scale = scale_of(HG_REAL_C(0.5), -16, 0);
+    const hg_e2e_config none = {.profile = HG_E2E_NONE};
+    const hg_message message = {.id = 1U, .length = 8U, .width = 1U, .field = &field, .scale = &scale, .e2e = &none};
+    hg_can_frame frame;
+    int32_t code = 7;
+    assert_false(hg_frame_valid(&message));
+    hg_frame_pack(&message, &code, &frame);
+    assert_status(HG_OK, hg_frame_unpack(&message, &frame, &code));
+    assert_int_equal(HG_CODE_INVALID, code);
+    frame.data[0] ^= 1U;
+    assert_status(HG_E_NUMERIC, hg_frame_unpack(&message, &frame, &code));
 }
 
 /* ---- a generator ---- */
@@ -490,6 +509,7 @@ int main(void)
         cmocka_unit_test(sums_of_whole_tables_never_overflow),
         cmocka_unit_test(every_16_bit_code_survives_the_round_trip),
         cmocka_unit_test(what_did_not_fit_has_no_code),
+        cmocka_unit_test(a_float_field_is_refused),
         cmocka_unit_test(a_generator_is_its_equations_with_one_rounding_a_sum),
         cmocka_unit_test(a_threshold_is_its_formula_with_one_rounding_a_sum),
         cmocka_unit_test(tables_with_an_exponent_out_of_range_are_refused),
