@@ -208,16 +208,21 @@ static void hull(const hg_hull_config *h)
 {
     u("wide", h->width);
     us("wide", h->signal, h->width);
-    u("taps", h->taps);
-    rs("weight", h->weight, (unsigned)h->taps * h->residuals * h->width);
+    s("hull_exponent", h->exponent);
+    us("taps", h->taps, h->width);
+    unsigned taps = 0U;
+    for (unsigned g = 0U; g < h->width; g++) { taps += h->taps[g]; }
+    rs("weight", h->weight, taps * h->residuals);
     u("settle", h->settle);
     rs("rest", h->rest, (unsigned)h->settle * h->residuals);
+    rs("rest_left", h->rest_left, h->residuals);
     rs("moving", h->moving, (unsigned)h->settle * h->residuals);
+    rs("moving_left", h->moving_left, h->residuals);
+    rs("hull_bias", h->bias, h->residuals);
     u("ready_rest", h->ready_rest);
     u("ready_moving", h->ready_moving);
-    r("decay", h->decay);
-    rs("tail_input", h->tail_input, h->width);
-    rs("tail_output", h->tail_output, h->residuals);
+    rs("decay", h->decay, h->residuals);
+    rs("tail", h->tail, (unsigned)h->residuals * h->width);
 }
 
 static void zonotope(const hg_zonotope_config *z)
@@ -664,7 +669,14 @@ def _generator(g: GeneratorTable) -> Numbers:
     if g.zonotope is not None:
         return numbers + _zonotope(g.zonotope)
     numbers += _each("wide", len(g.wide)) + _each("wide", g.wide)
-    return numbers + _some(g, "taps", "weight", "settle", "rest", "moving", "ready_rest", "ready_moving", "decay", "tail_input", "tail_output")
+    numbers += _each("hull_exponent", 0) + _some(g, "taps") + _each("weight", _laid_out(g)) + _some(g, "settle", "rest", "rest_left", "moving", "moving_left")
+    return numbers + _each("hull_bias", g.bias) + _some(g, "ready_rest", "ready_moving", "decay", "tail")
+
+
+def _laid_out(g: GeneratorTable) -> tuple[float, ...]:
+    """hull.h: residuals 0 and 1, then 2 and 3, .., of each two signal after signal, lag after lag."""
+    count = len(g.output)
+    return tuple(g.weight[lag][i][s] for first in range(0, count, 2) for s, taps in enumerate(g.taps) for lag in range(taps) for i in range(first, min(first + 2, count)))
 
 
 def _zonotope(z: ZonotopeTable) -> Numbers:

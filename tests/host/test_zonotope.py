@@ -21,6 +21,7 @@ from hullguard.design.observer import SubPlant
 from hullguard.design.zonotope_table import BALL, BOX, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from linear_support import KINDS, pair, random_state
 
 SOUND = (BOX, BALL)
 RUNS = 30
@@ -68,32 +69,6 @@ def exact(lin: hull.Linear, radius: Array, bias: Array) -> Array:
     return bias[np.minimum(np.arange(len(radius)), len(bias) - 1)] * (1 - 8 * U32) + np.array(sums)
 
 
-def pair(size: float, angle: float) -> Array:
-    return size * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-def companion(gamma: Array) -> Array:
-    G = np.eye(len(gamma), k=-1)
-    G[:, -1] = gamma
-    return G
-
-
-def random_state(rng: np.random.Generator, kind: str) -> Array:
-    """A stable state matrix: separate poles, deadbeat, multiple poles, or a companion."""
-    if kind == "deadbeat":
-        return companion(np.zeros(int(rng.integers(1, 7))))
-    if kind == "multiple":
-        s = int(rng.integers(2, 5))
-        return companion(-np.poly(np.full(s, rng.uniform(0.0, 0.6)))[::-1][:s])
-    blocks: list[Array] = [np.array([[rng.uniform(-0.95, 0.95)]]) for _ in range(int(rng.integers(0, 4)))]
-    blocks += [pair(rng.uniform(0.0, 0.95), rng.uniform(0.1, 3.0)) for _ in range(int(rng.integers(0 if blocks else 1, 3)))]
-    modal = scipy.linalg.block_diag(*blocks)
-    if kind == "companion":
-        return companion(-np.poly(np.linalg.eigvals(modal)).real[::-1][: len(modal)])
-    X = rng.standard_normal(modal.shape)
-    return np.asarray(X @ modal @ np.linalg.inv(X))
-
-
 def random_linear(rng: np.random.Generator, kind: str) -> tuple[hull.Linear, Array]:
     """A generator in units of every size, and its usual radii."""
     state = random_state(rng, kind)
@@ -117,7 +92,8 @@ def table_of(lin: hull.Linear, radius: Array, columns: int, reduction: int, bias
     sub = SubPlant(np.eye(s), np.zeros((s, 0)), np.zeros((width, s)), np.zeros((width, 0)), np.zeros((s, 1)), np.zeros((width, 1)), radius, np.zeros(0))
     one, none = up32(np.full((1, residuals), bias)), np.zeros(residuals)
     steady = exact(lin, np.tile(radius, (100, 1)), one)[-1]
-    tables = hull.HullTables(np.zeros((1, residuals, width)), one, one, 0, 0, 0.0, np.zeros(width), none, none, steady)
+    nothing = np.zeros((residuals, width))
+    tables = hull.HullTables(nothing[None], (1,) * width, one, one, 1, none, none, one[0], 0, 0, none, nothing, none, steady)
     ranges = hull.Ranges(np.zeros(s), np.zeros(s), np.zeros(width), np.zeros(0), np.zeros(0))
     return zonotope.build(lin, np.eye(s), sub, ranges, radius, tables, tuple(range(width)), columns, reduction, "random")
 
@@ -129,7 +105,7 @@ def linears() -> list[tuple[hull.Linear, Array, np.random.Generator]]:
     refused = 0
     for i in range(40):
         rng = np.random.default_rng([SEED, i])
-        lin, radius = random_linear(rng, ("modal", "deadbeat", "multiple", "companion")[i % 4])
+        lin, radius = random_linear(rng, KINDS[i % 4])
         try:
             table_of(lin, radius, 250, BALL)
             made.append((lin, radius, rng))

@@ -42,10 +42,15 @@ static void give(rig *r, uint8_t group, int32_t a, int32_t b, bool continues)
 static void refuse(const hg_detector_config *config, hg_status expected)
 {
     static sm_storage storage;
+    static hg_real real[SM_REALS + 9U];
     hg_detector self;
-    const hg_detector_memory memory = sm_memory(&storage);
+    hg_detector_memory memory = sm_memory(&storage);
+    arm(real, COUNT(real));
+    memory.real = real; /* enough even for tables that contradict one another */
+    memory.reals = SM_REALS + 8U;
     assert_status(expected, hg_detector_start(&self, config, &memory, HG_START_REST));
     sm_check_canaries(&storage);
+    assert_untouched(&real[SM_REALS + 8U], 1U);
 }
 
 static void null_pointers_are_refused(void **state)
@@ -138,6 +143,41 @@ static void contradicting_groups_are_refused(void **state)
     refuse(&c, HG_E_CONFIG);
 }
 
+/* A frame can be found lost as long as its group may be silent; a signal without events needs no more than one tap. */
+static void a_rewind_ends_within_a_signals_own_taps(void **state)
+{
+    (void)state;
+    hg_hull_config hull[SM_GENERATORS] = {sm_hull[0], sm_hull[1]};
+    hg_detector_config c = sm_detector;
+    c.hull = hull;
+    const uint8_t enough[] = {4U, 1U};
+    const uint8_t few[] = {3U, 1U};
+    rig r;
+    hull[0].taps = enough;
+    begin_with(&r, &c, HG_START_REST);
+    hull[1].taps = enough;
+    begin_with(&r, &c, HG_START_REST);
+    hull[1].taps = few;
+    refuse(&c, HG_E_CONFIG);
+    hull[0].taps = few;
+    hull[1].taps = enough;
+    refuse(&c, HG_E_CONFIG);
+    hg_trigger_config slow = sm_trigger_b;
+    hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
+    slow.interval_max = 2U;
+    hold[1].trigger = &slow;
+    c.hold = hold;
+    hull[0].taps = enough; /* one tap is not enough for two samples */
+    refuse(&c, HG_E_CONFIG);
+    hull[0].taps = NULL;
+    refuse(&c, HG_E_CONFIG);
+    hull[0] = sm_hull[0];
+    hull[0].signal = NULL;
+    refuse(&c, HG_E_CONFIG);
+    hull[0] = sm_hull[0];
+    begin_with(&r, &c, HG_START_REST);
+}
+
 static void contradicting_generators_are_refused(void **state)
 {
     (void)state;
@@ -158,7 +198,8 @@ static void contradicting_generators_are_refused(void **state)
     residual[1].state.rows = 2U;
     refuse(&c, HG_E_CONFIG);
     residual[1] = sm_residual[1];
-    hull[0].decay = R(1);
+    const hg_real endless = R(1);
+    hull[0].decay = &endless;
     refuse(&c, HG_E_CONFIG);
     hull[0] = sm_hull[0];
     const hg_detector_config good = c;
@@ -448,6 +489,7 @@ int main(void)
         cmocka_unit_test(memory_one_too_short_is_refused),
         cmocka_unit_test(contradicting_tables_are_refused),
         cmocka_unit_test(contradicting_groups_are_refused),
+        cmocka_unit_test(a_rewind_ends_within_a_signals_own_taps),
         cmocka_unit_test(contradicting_generators_are_refused),
         cmocka_unit_test(a_sample_computes_by_hand),
         cmocka_unit_test(groups_that_do_not_exist_are_refused),

@@ -21,7 +21,7 @@
 #define HISTORY 6U
 #define TAPS 5U
 #define SETTLE 6U
-#define REALS ((3U * WIDTH) + (2U * 3U) + (WIDTH * HISTORY) + (SM_SIGNALS * WINDOW) + 4U + 3U + 7U)
+#define REALS ((3U * WIDTH) + (2U * 3U) + (WIDTH * HISTORY) + (SM_SIGNALS * WINDOW) + 4U + 3U + 7U + 2U)
 #define SUMS (2U * CERTIFICATES)
 #define TINY 0.000244140625
 #define DRIFT (0.0078125 + 0.03125 + 0.015625 + (0.25 * SM_HALF)) /* of the prediction in a sample */
@@ -57,13 +57,15 @@ static const hg_residual_config residual[] = {
      .output = {1U, 1U, 0, sm_minus_one}, .direct = {1U, 2U, 0, direct_0}},
     {.order = 1U, .residuals = 1U, .width = 1U, .signal = sm_signals_1, .state = {1U, 1U, 0, zeros}, .input = {1U, 1U, 0, sm_one},
      .output = {1U, 1U, 0, sm_minus_one}, .direct = {1U, 1U, 0, sm_one}}};
-static const hg_real weight_0[TAPS * 3U] = {R(1), R(0), R(0), R(1), R(0.25), R(1)};
-static const hg_real bias_0[] = {R(64), R(TINY)};
+static const uint8_t taps[] = {TAPS, TAPS, TAPS};
+static const hg_real weight_0[TAPS * 3U] = {[0] = R(1), [1] = R(1), [TAPS + 1U] = R(0.25), [(2U * TAPS) + 1U] = R(1)};
+static const hg_real bias_0[] = {R(TINY)};
 static const hg_hull_config hull[] = {
-    {.residuals = 1U, .width = 3U, .signal = wide_0, .taps = TAPS, .weight = weight_0, .settle = 2U, .rest = bias_0, .moving = bias_0,
-     .ready_rest = 0U, .ready_moving = 2U, .decay = R(0), .tail_input = zeros, .tail_output = zeros},
-    {.residuals = 1U, .width = 1U, .signal = sm_signals_1, .taps = TAPS, .weight = sm_weight_1, .settle = 2U, .rest = sm_bias_1,
-     .moving = sm_bias_1, .ready_rest = 0U, .ready_moving = 2U, .decay = R(0), .tail_input = zeros, .tail_output = zeros}};
+    {.residuals = 1U, .width = 3U, .signal = wide_0, .taps = taps, .weight = weight_0, .settle = 1U, .rest = sm_start_0, .rest_left = zeros,
+     .moving = sm_start_0, .moving_left = zeros, .bias = bias_0, .ready_rest = 0U, .ready_moving = 2U, .decay = zeros, .tail = zeros},
+    {.residuals = 1U, .width = 1U, .signal = sm_signals_1, .taps = taps, .weight = sm_weight_1, .settle = 1U, .rest = sm_start_1,
+     .rest_left = zeros, .moving = sm_start_1, .moving_left = zeros, .bias = sm_bias_1, .ready_rest = 0U, .ready_moving = 2U,
+     .decay = zeros, .tail = zeros}};
 
 static const uint8_t bank_place[] = {0U, 2U};
 static const uint8_t bank_extra[] = {5U};
@@ -306,6 +308,9 @@ static void contradicting_predictors_are_refused(void **state)
     p[0].input = derived;
     assert_refused(&c);
     p[0] = predict[0];
+    p[0].correct.exponent = 1; /* float tables are not scaled */
+    assert_refused(&c);
+    p[0] = predict[0];
     p[0].first = 1U; /* not where group 0 begins */
     assert_refused(&c);
     p[0] = predict[0];
@@ -335,6 +340,9 @@ static void a_contradicting_mismatch_is_refused(void **state)
     m.signal = derived;
     assert_refused(&c);
     m = mismatch;
+    m.exponent = 1; /* float tables are not scaled */
+    assert_refused(&c);
+    m = mismatch;
     m.states = 0U; /* one place is left over */
     assert_refused(&c);
 }
@@ -351,6 +359,9 @@ static void contradicting_banks_are_refused(void **state)
     assert_refused(&c);
     b[0] = bank[0];
     b[0].signal = derived; /* has no value that is kept */
+    assert_refused(&c);
+    b[0] = bank[0];
+    b[0].exponent = -1;
     assert_refused(&c);
     b[0] = bank[0];
     b[0].extra = outside;

@@ -25,7 +25,7 @@ static const hg_trigger_config trigger = {.width = WIDTH,
                                           .activity = activity_table,
                                           .zero = zero_table};
 /* Powers of two everywhere, so that float32 adds nothing to compare with. */
-static const hg_code_scale scale_table[WIDTH] = {{R(0.25), R(0), R(4), -400, 400}, {R(0.5), R(10), R(2), -400, 400}};
+static const hg_code_scale scale_table[WIDTH] = {{R(0.25), R(0), R(4), 0, -400, 400}, {R(0.5), R(10), R(2), 0, -400, 400}};
 static const hg_real half_table[WIDTH] = {R(0.125), R(0.25)};
 static const hg_real span_table[WIDTH] = {R(200), R(400)};
 static const hg_real middle_table[WIDTH] = {R(1), R(12)};

@@ -29,7 +29,7 @@ typedef struct {                 /* flash: one a generator, generated */
     const uint8_t *taps;         /* [width] 0 .. ring length - 1 */
     const hg_real *weight;       /* >= 0: residuals 0 and 1, then 2 and 3, .., of each two (the last may be alone) signal after signal [taps + 1][2 or 1]:
                                     |h_ig(j)| by lag, then tail_gi */
-    uint16_t       settle;       /* rows of the bias tables, 0 .. UINT16_MAX - 1 */
+    uint16_t       settle;       /* rows of the bias tables, 1 .. UINT16_MAX - 1 */
     const hg_real *rest;         /* [settle][residuals] bias after a start within the initial range, then */
     const hg_real *rest_left;    /* [residuals] what theta(settle - 1) is given */
     const hg_real *moving;       /* [settle][residuals] bias after a start anywhere in the state range, then */
