@@ -40,7 +40,7 @@ uint32_t hg_detector_reals(const hg_detector_config *config)
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
     }
     for (uint8_t g = 0U; (config->hull != NULL) && (g < config->generators); g++) {
-        reals += HG_HULL_REALS(config->hull[g].residuals);
+        reals += HG_HULL_REALS(config->hull[g].residuals, config->hull[g].modes);
     }
     for (uint8_t g = 0U; BY_ZONOTOPE(config) && (g < config->generators); g++) {
         const hg_zonotope_config *zonotope = &config->zonotope[g];
@@ -189,7 +189,7 @@ static hg_status start_generators(hg_detector *self, hg_start how)
             memory = &memory[HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances)];
         } else if (status == HG_OK) {
             status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how, memory);
-            memory = &memory[HG_HULL_REALS(config->hull[g].residuals)];
+            memory = &memory[HG_HULL_REALS(config->hull[g].residuals, config->hull[g].modes)];
         } else {
             /* refused */
         }
@@ -229,6 +229,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     self->config = config;
     self->memory = *memory;
     self->refusals = 0U;
+    self->beginnings = 1U;
     self->value = memory->real;
     self->r = &self->value[config->width];
     self->J = &self->r[config->residuals];
@@ -264,6 +265,7 @@ static void reset_banks(hg_detector *self)
 
 void hg_detector_restart(hg_detector *self, hg_start how)
 {
+    self->beginnings++;
     hg_ring_reset(&self->radii);
     for (uint8_t i = 0U; i < self->config->predictors; i++) {
         hg_predict_reset(&self->memory.predict[i]);

@@ -9,10 +9,20 @@ static bool tables_there(const hg_hull_config *config)
            (config->decay != NULL);
 }
 
+static bool modes_valid(const hg_hull_config *config)
+{
+    bool valid = (config->modes == 0U) || ((config->mode_decay != NULL) && (config->mode_input != NULL) && (config->mode_output != NULL) &&
+                                           (config->mode_rest != NULL) && (config->mode_moving != NULL));
+    for (uint8_t m = 0U; valid && (m < config->modes); m++) {
+        valid = (config->mode_decay[m] >= HG_REAL_ZERO) && (config->mode_decay[m] < HG_REAL_C(1.0));
+    }
+    return valid;
+}
+
 bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length)
 {
     bool valid = (config->residuals >= 1U) && (config->width >= 1U) && (config->settle >= 1U) && (config->settle < UINT16_MAX) &&
-                 hg_exponent_valid(config->exponent) && tables_there(config);
+                 hg_exponent_valid(config->exponent) && tables_there(config) && modes_valid(config);
     for (uint8_t g = 0U; valid && (g < config->width); g++) {
         valid = (config->signal[g] < ring_width) && (config->taps[g] < ring_length);
     }
@@ -32,6 +42,7 @@ hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_ri
     }
     self->config = config;
     self->theta = memory;
+    self->mode = &memory[config->residuals];
     hg_hull_reset(self, how);
     return HG_OK;
 }
@@ -40,6 +51,9 @@ void hg_hull_reset(hg_hull *self, hg_start how)
 {
     for (uint8_t i = 0U; i < self->config->residuals; i++) {
         self->theta[i] = HG_REAL_ZERO;
+    }
+    for (uint8_t m = 0U; m < self->config->modes; m++) {
+        self->mode[m] = ((how == HG_START_REST) ? self->config->mode_rest : self->config->mode_moving)[m];
     }
     self->k = 0U;
     self->how = how;
@@ -121,9 +135,31 @@ static hg_real move_tail(hg_hull *self, uint8_t i, hg_acc leaving)
     return self->theta[i];
 }
 
-static hg_real whole(const hg_hull *self, hg_acc sum, hg_real bias, hg_real theta)
+/* The same of the modes. */
+static void move_modes(hg_hull *self, const hg_ring *ring)
 {
-    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(sum, self->config->exponent)), theta), HG_REAL_MAX);
+    const hg_hull_config *config = self->config;
+    const hg_real *input = config->mode_input;
+    for (uint8_t m = 0U; m < config->modes; m++) {
+        hg_acc sum = hg_acc_zero();
+        for (uint8_t g = 0U; g < config->width; g++) {
+            sum = hg_acc_mac(sum, *input, hg_ring_row(ring, config->taps[g])[config->signal[g]]);
+            input = &input[1];
+        }
+        const hg_real kept = hg_real_mul(config->mode_decay[m], self->mode[m]);
+        self->mode[m] = hg_real_min(hg_real_add(kept, hg_acc_real(sum, config->exponent)), HG_REAL_MAX);
+    }
+}
+
+/* Threshold of one residual from its sum over the taps; the modes are added to it. */
+static hg_real whole(const hg_hull *self, uint8_t i, hg_acc sum, hg_real bias, hg_real theta)
+{
+    const hg_hull_config *config = self->config;
+    hg_acc all = sum;
+    for (uint8_t m = 0U; m < config->modes; m++) {
+        all = hg_acc_mac(all, config->mode_output[((uint16_t)i * config->modes) + m], self->mode[m]);
+    }
+    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(all, config->exponent)), theta), HG_REAL_MAX);
 }
 
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
@@ -132,14 +168,15 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
     const hg_real *weight = config->weight;
     const hg_real *bias = bias_step(self);
     uint8_t i = 0U;
+    move_modes(self, ring);
     while ((uint8_t)(i + 1U) < config->residuals) {
         hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
         hg_pair tail = sum;
         for (uint8_t g = 0U; g < config->width; g++) {
             weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], true);
         }
-        J[i] = whole(self, sum.first, bias[i], move_tail(self, i, tail.first));
-        J[i + 1U] = whole(self, sum.second, bias[i + 1U], move_tail(self, (uint8_t)(i + 1U), tail.second));
+        J[i] = whole(self, i, sum.first, bias[i], move_tail(self, i, tail.first));
+        J[i + 1U] = whole(self, (uint8_t)(i + 1U), sum.second, bias[i + 1U], move_tail(self, (uint8_t)(i + 1U), tail.second));
         i += 2U;
     }
     if (i < config->residuals) {
@@ -148,7 +185,7 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
         for (uint8_t g = 0U; g < config->width; g++) {
             weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], false);
         }
-        J[i] = whole(self, sum.first, bias[i], move_tail(self, i, tail.first));
+        J[i] = whole(self, i, sum.first, bias[i], move_tail(self, i, tail.first));
     }
     self->k = (self->k < UINT16_MAX) ? (uint16_t)(self->k + 1U) : UINT16_MAX;
 }

@@ -28,6 +28,7 @@ extern "C" {
 #include "hullguard/hull.h"
 #include "hullguard/residual.h"
 #include "hullguard/trigger.h"
+#include "hullguard/uio.h"
 }
 
 namespace {
@@ -1727,6 +1728,260 @@ void test_bank(void **)
     expect_clean(failure);
 }
 
+/* ---- The unknown-input observer (suspension, sections 1.1 and 1.4) ---- */
+
+struct UnknownInput {
+    oracle::UnknownInputPlant plant;
+    Matrix                    K1;
+    double                    sample_time = 0.0;
+    Vector                    low;
+};
+
+/* In coordinates x = [hidden; y] with G = [0; G2], A1 = (I - HC) A leaves the hidden rows of A as they are: they are the invariant zeros, stable because A
+ *  is diagonally dominant, and K1 cancels their coupling and puts the other poles where it likes. Then seen from a random basis. */
+UnknownInput random_unknown_input(Random &random)
+{
+    const int    n = random.whole(2, 8), q = random.whole(1, std::min(3, n)), m = random.whole(q, n), p = random.whole(1, 2), h = n - m;
+    UnknownInput u;
+    const Matrix A = random.matrix(n, n) - (n + 0.5) * Matrix::Identity(n, n);
+    Matrix       G = Matrix::Zero(n, q), C = Matrix::Zero(m, n), K1(n, m), T = random.matrix(n, n) + 3.0 * Matrix::Identity(n, n);
+    Matrix       G2 = random.matrix(m, q);
+    G2.topRows(q) += 2.0 * Matrix::Identity(q, q);
+    G.bottomRows(m) = G2;
+    C.rightCols(m) = Matrix::Identity(m, m);
+    const Matrix P = Matrix::Identity(m, m) - G2 * (G2.transpose() * G2).inverse() * G2.transpose();
+    Vector       poles(m);
+    for (Eigen::Index i = 0; i < m; ++i) { poles(i) = random.real(0.5, 8.0); }
+    K1.topRows(h) = A.topRightCorner(h, m);
+    K1.bottomRows(m) = P * A.bottomRightCorner(m, m) + Matrix(poles.asDiagonal());
+    while (std::abs(T.determinant()) < 0.1) { T += Matrix::Identity(n, n); }
+    u.plant = {T * A * T.inverse(), T * random.matrix(n, p), T * G, C * T.inverse()};
+    u.K1 = T * K1;
+    u.sample_time = random.real(0.01, 0.1);
+    u.low = Vector(q);
+    for (Eigen::Index i = 0; i < q; ++i) { u.low(i) = random.chance(0.2) ? 1.0 : random.real(0.05, 0.9); }
+    return u;
+}
+
+/* uio.h: s, g -> fhat, xhat */
+System estimator(const oracle::UnknownInputObserver &o, const Vector &low)
+{
+    const Eigen::Index n = o.Fd.rows(), q = low.size(), m = o.H.cols(), p = o.Bd.cols();
+    const Matrix a = low.asDiagonal(), keep = Matrix::Identity(q, q) - a, direct = o.K1d + o.H;
+    const Matrix N = keep * a * o.inverse - a * o.inverse * o.Ad;
+    Matrix       A(n + q, n + q), B(n + q, m + p), C(q + n, n + q), D(q + n, m + p);
+    A << o.Fd, Matrix::Zero(n, q), N, keep;
+    B << o.Fd * o.K1d + o.K0, o.Bz, N * direct, -a * o.inverse * o.Bd;
+    C << a * o.inverse, Matrix::Identity(q, q), Matrix::Identity(n, n), Matrix::Zero(n, q);
+    D << a * o.inverse * direct, Matrix::Zero(q, p), direct, Matrix::Zero(n, p);
+    return plain(A, B, C, D);
+}
+
+/* A theta for each eigenvalue; hull.h */
+struct Modes {
+    Vector decay;
+    Matrix input, output; /* modes x width, estimates x modes */
+    Reals  decay_table, input_table, output_table, none;
+
+    Modes(const System &s, int taps)
+    {
+        const Eigen::EigenSolver<Matrix> eigen(s.A);
+        const Eigen::MatrixXcd           S = eigen.eigenvectors();
+        const double                     widen = 1.0 + unit * (10.0 + static_cast<double>(s.B.cols() + s.A.rows()));
+        decay  = eigen.eigenvalues().cwiseAbs();
+        input  = (S.inverse() * s.B).cwiseAbs();
+        output = (s.C * S).cwiseAbs() * Vector(decay.array().pow(taps - 1)).asDiagonal();
+        HullTables::append(decay_table, decay.transpose() * (1.0 + 8.0 * unit));
+        HullTables::append(input_table, input * widen);
+        HullTables::append(output_table, output * widen);
+        none.assign(static_cast<size_t>(decay.size()), static_cast<hg_real>(0));
+    }
+    void into(hg_hull_config &config) const
+    {
+        config.modes = static_cast<std::uint8_t>(decay.size());
+        config.mode_decay = decay_table.data();
+        config.mode_input = input_table.data();
+        config.mode_output = output_table.data();
+        config.mode_rest = config.mode_moving = none.data();
+    }
+};
+
+struct UioCount {
+    int    observers = 0;
+    double wrong = 0.0; /* largest difference over its tolerance */
+    double wide  = 0.0; /* sum of the logarithms of radius over exact, */
+    double common = 0.0; /* the same with one decay for all modes, */
+    int    radii = 0;   /* and how many */
+};
+
+/* One observer in the library beside the oracle's. */
+struct Estimating {
+    System           system;
+    Residual         residual;
+    Tail             no_tail;
+    HullTables       hull;
+    Modes            modes;
+    hg_uio_config    config{};
+    hg_uio           self{};
+    hg_ring          ring{};
+    Reals            ring_memory, memory;
+
+    Estimating(const System &s, const std::vector<std::uint8_t> &places, Eigen::Index all, Eigen::Index q, int taps)
+        : system(s), residual(s, places), no_tail{0.0, Vector::Zero(s.C.rows()), Vector::Zero(s.B.cols()), true},
+          hull(s, places, taps, Matrix::Zero(1, s.C.rows()), Matrix::Zero(1, s.C.rows()), no_tail, 0, 0), modes(s, taps)
+    {
+        config.actuators = static_cast<std::uint8_t>(q);
+        config.states = static_cast<std::uint8_t>(s.C.rows() - q);
+        config.observer = residual.config;
+        config.hull = hull.config;
+        modes.into(config.hull);
+        ring_memory.resize(static_cast<size_t>(all * (taps + 1)));
+        memory.resize(HG_UIO_REALS(s.A.rows(), s.B.cols(), config.hull.modes));
+    }
+    bool start(Eigen::Index all, int taps)
+    {
+        return hg_ring_start(&ring, static_cast<std::uint8_t>(all), static_cast<std::uint8_t>(taps + 1), ring_memory.data()) == HG_OK &&
+               hg_uio_start(&self, &config, &ring, HG_START_REST, memory.data()) == HG_OK;
+    }
+};
+
+/* The exact radius by the impulse response, what the tail by modes may add, and what a common one would. */
+struct Sums {
+    Vector exact, modal, common;
+};
+
+Sums sums_of(const System &s, const Modes &modes, int taps, const std::vector<Vector> &radii)
+{
+    Sums         sum{s.D_abs * radii.back(), Vector::Zero(s.C.rows()), Vector::Zero(s.C.rows())};
+    Matrix       response = s.B;
+    const double slowest = modes.decay.maxCoeff();
+    const Vector at_once = modes.output.rowwise().sum(), most = modes.input.colwise().maxCoeff().transpose();
+    sum.modal = sum.common = sum.exact;
+    for (size_t lag = 1; lag < radii.size(); ++lag) {
+        const Vector &radius = radii[radii.size() - 1 - lag];
+        const Vector  part = (s.C * response).cwiseAbs() * radius;
+        const auto    behind = static_cast<double>(lag) - taps;
+        sum.exact += part;
+        if (behind < 0) {
+            sum.modal += part;
+            sum.common += part;
+        } else {
+            sum.modal += modes.output * Vector(modes.decay.array().pow(behind)).asDiagonal() * modes.input * radius;
+            sum.common += at_once * std::pow(slowest, behind) * most.dot(radius);
+        }
+        response = s.A * response;
+    }
+    return sum;
+}
+
+std::string compare_estimates(const Estimating &lib, const oracle::UnknownInputObserver &exact, const Vector &tolerance, const Reals &estimate,
+                              UioCount &count)
+{
+    const Eigen::Index q = exact.input().size();
+    for (Eigen::Index i = 0; i < lib.system.C.rows(); ++i) {
+        const double mine = (i < q) ? exact.input()(i) : exact.state()(i - q), its = static_cast<double>(estimate[static_cast<size_t>(i)]);
+        count.wrong = std::max(count.wrong, std::abs(its - mine) / tolerance(i));
+        if (!(std::abs(its - mine) <= tolerance(i))) { return say("estimate %ld: %.17g, oracle %.17g, tolerance %g", static_cast<long>(i), its, mine, tolerance(i)); }
+    }
+    return {};
+}
+
+std::string compare_radii(const Sums &sum, double slack, double noise, const Reals &bound, UioCount &count)
+{
+    for (Eigen::Index i = 0; i < sum.exact.size(); ++i) {
+        const double its = static_cast<double>(bound[static_cast<size_t>(i)]);
+        if (!(its >= sum.exact(i) * (1.0 - 1e-12) - noise)) { return say("radius %ld: %.17g below the exact %.17g", static_cast<long>(i), its, sum.exact(i)); }
+        if (!(its <= sum.modal(i) * (1.0 + slack) + noise)) { return say("radius %ld: %.17g above %.17g", static_cast<long>(i), its, sum.modal(i)); }
+        if (sum.exact(i) > 1e3 * noise) {
+            count.wide += std::log(its / sum.exact(i));
+            count.common += std::log(sum.common(i) / sum.exact(i));
+            count.radii++;
+        }
+    }
+    return {};
+}
+
+/* Constant unknown inputs move the plant from rest; in the end all estimates are the truth, because y is straight by then. */
+std::string truth_is_found(const UnknownInput &u, Estimating &lib, const std::vector<std::uint8_t> &places, const Vector &tolerance, Random &random)
+{
+    const oracle::UnknownInputObserver o(u.plant, u.K1, u.sample_time, u.low);
+    const Eigen::Index q = u.low.size(), n = o.Ad.rows();
+    const Vector       f = random.matrix(q, 1), in = random.matrix(o.Bd.cols(), 1);
+    Vector             x = Vector::Zero(n);
+    Reals              value(lib.ring.width), estimate(static_cast<size_t>(n + q)), bound(estimate.size()), none(lib.ring.width);
+    hg_uio_reset(&lib.self, HG_START_REST);
+    hg_ring_reset(&lib.ring);
+    for (int k = 0; k < 6000; ++k) {
+        Vector signals(places.size());
+        signals << u.plant.C * x, in;
+        for (size_t i = 0; i < places.size(); ++i) { value[places[i]] = nearest(signals(static_cast<Eigen::Index>(i))); }
+        if (hg_ring_push(&lib.ring, none.data()) != HG_OK || hg_uio_step(&lib.self, value.data(), &lib.ring, estimate.data(), bound.data()) != HG_OK) { return "refused"; }
+        x = o.Ad * x + o.Bd * in + o.Gd * f;
+    }
+    for (Eigen::Index i = 0; i < n + q; ++i) {
+        const double truth = (i < q) ? f(i) : x(i - q), its = static_cast<double>(estimate[static_cast<size_t>(i)]);
+        if (!(std::abs(its - truth) <= tolerance(i) + 1e-8)) { return say("estimate %ld: %.17g, truth %.17g, tolerance %g", static_cast<long>(i), its, truth, tolerance(i)); }
+    }
+    return {};
+}
+
+std::string one_uio(Random &random, UioCount &count)
+{
+    const UnknownInput           u = random_unknown_input(random);
+    oracle::UnknownInputObserver exact(u.plant, u.K1, u.sample_time, u.low);
+    const System                 s = estimator(exact, u.low);
+    const Eigen::Index           width = s.B.cols(), m = exact.H.cols(), all = width + random.whole(0, 2), q = u.low.size();
+    if (!diagonalisable(s.A)) { return {}; }
+    const auto  places = random_places(random, width, all);
+    const int   taps = random.whole(1, 40), samples = 150;
+    Estimating  lib(s, places, all, q, taps);
+    if (!lib.start(all, taps)) { return "start refused"; }
+    ++count.observers;
+
+    std::vector<Vector> radii;
+    std::vector<int>    mode(static_cast<size_t>(all), 1);
+    Reals               radius(static_cast<size_t>(all)), value(static_cast<size_t>(all)), estimate(static_cast<size_t>(s.C.rows())), bound(estimate.size());
+    const Vector        ones = Vector::Ones(width);
+    Matrix              reach = s.B_abs, response = s.B; /* of the state, for signals of at most 1 */
+    for (int j = 0; j < 3000; ++j) {
+        response = s.A * response;
+        reach += response.cwiseAbs();
+    }
+    const Vector tolerance = 4.0 * rounding(s, m, reach * ones, ones, unit) + Vector::Constant(s.C.rows(), 1e-11);
+    for (int k = 0; k < samples; ++k) {
+        random_radii(random, radius, mode);
+        Vector in(width), wide(width);
+        for (hg_real &v : value) { v = nearest(random.real(-1.0, 1.0)); }
+        for (Eigen::Index i = 0; i < width; ++i) {
+            in(i) = static_cast<double>(value[places[static_cast<size_t>(i)]]);
+            wide(i) = static_cast<double>(radius[places[static_cast<size_t>(i)]]);
+        }
+        exact.step(in.head(m), in.tail(width - m));
+        radii.push_back(wide);
+        if (hg_ring_push(&lib.ring, radius.data()) != HG_OK || hg_uio_step(&lib.self, value.data(), &lib.ring, estimate.data(), bound.data()) != HG_OK) { return "refused"; }
+        std::string wrong = compare_estimates(lib, exact, tolerance, estimate, count);
+        const Sums  sum = sums_of(s, lib.modes, taps, radii);
+        if (wrong.empty()) { wrong = compare_radii(sum, 8.0 * unit * (taps * static_cast<double>(width) + 20.0 + 4.0 * (k + 1)), 1e-11 * sum.modal.maxCoeff(), bound, count); }
+        if (!wrong.empty()) { return say("k %d: ", k) + wrong; }
+    }
+    return truth_is_found(u, lib, places, tolerance, random);
+}
+
+void test_uio(void **)
+{
+    Random      random = stream(9);
+    UioCount    count;
+    std::string failure;
+    for (int i = 0; i < problems / 10 && failure.empty(); ++i) {
+        failure = one_uio(random, count);
+        if (!failure.empty()) { failure = say("observer %d: ", i) + failure; }
+    }
+    const double wide = std::exp(count.wide / std::max(count.radii, 1)), common = std::exp(count.common / std::max(count.radii, 1));
+    std::printf("uio: %d observers, worst difference %.3g of its tolerance, radii %.3g x exact (%.3g with one decay; geometric means)\n", count.observers, count.wrong, wide, common);
+    if (failure.empty() && count.observers < problems / 20) { failure = "too few observers"; }
+    expect_clean(failure);
+}
+
 void test_detector(void **)
 {
     Random      random = stream(7);
@@ -1750,7 +2005,7 @@ int main()
     the_seed = seed != nullptr ? std::strtoull(seed, nullptr, 10) : std::random_device{}();
     std::printf("HULLGUARD_SEED=%llu (%s)\n", static_cast<unsigned long long>(the_seed), sizeof(hg_real) == 8 ? "float64" : "float32");
     const CMUnitTest tests[] = {
-        cmocka_unit_test(test_residual), cmocka_unit_test(test_hull),  cmocka_unit_test(test_oracle_itself),
+        cmocka_unit_test(test_uio), cmocka_unit_test(test_residual), cmocka_unit_test(test_hull),  cmocka_unit_test(test_oracle_itself),
         cmocka_unit_test(test_trigger),  cmocka_unit_test(test_hold), cmocka_unit_test(test_decision),
         cmocka_unit_test(test_detector), cmocka_unit_test(test_bank),
     };

@@ -361,10 +361,57 @@ static void restart_forgets_alarms(void **state)
     give(&r, 0U, 1000, 0, true);
     give(&r, 1U, 0, 0, true);
     assert_int_equal(HG_PLANT_CONFIRMED, step(&r));
+    assert_count(1U, r.self.beginnings);
     hg_detector_restart(&r.self, HG_START_REST);
+    assert_count(2U, r.self.beginnings);
     give(&r, 0U, 0, 0, true);
     give(&r, 1U, 0, 0, true);
     assert_int_equal(HG_PLANT_NONE, step(&r));
+}
+
+/* Their thetas take their memory from the detector's, and shift nobody else's. */
+static void a_threshold_with_modes_stands_beside_the_others(void **state)
+{
+    (void)state;
+    const hg_real decay[2] = {R(0.5), R(0.25)};
+    const hg_real in[4] = {R(1), R(1), R(1), R(1)};
+    const hg_real out[2] = {R(1), R(2)};
+    const hg_real begun[2] = {R(8), R(16)};
+    hg_hull_config hull[SM_GENERATORS] = {sm_hull[0], sm_hull[1]};
+    hull[0].modes = 2U;
+    hull[0].mode_decay = decay;
+    hull[0].mode_input = in;
+    hull[0].mode_output = out;
+    hull[0].mode_rest = begun;
+    hull[0].mode_moving = begun;
+    hg_detector_config c = sm_detector;
+    c.hull = hull;
+    assert_count(SM_REALS + 2U, hg_detector_reals(&c));
+    refuse(&c, HG_E_SIZE);
+    rig r;
+    rig plain;
+    hg_real real[SM_REALS + 3U];
+    arm(real, COUNT(real));
+    begin(&plain, HG_START_REST);
+    hg_detector_memory memory = sm_memory(&r.storage);
+    memory.real = real;
+    memory.reals = SM_REALS + 2U;
+    assert_status(HG_OK, hg_detector_start(&r.self, &c, &memory, HG_START_REST));
+    double mode[2] = {8.0, 16.0};
+    for (int k = 0; k < 10; k++) {
+        give(&r, 0U, 64, 128, true);
+        give(&r, 1U, 62, 0, true);
+        give(&plain, 0U, 64, 128, true);
+        give(&plain, 1U, 62, 0, true);
+        assert_int_equal(step(&plain), step(&r));
+        for (size_t m = 0U; m < 2U; m++) {
+            mode[m] = ((double)decay[m] * mode[m]) + ((k < (int)SM_TAPS) ? 0.0 : (2.0 * SM_HALF));
+        }
+        assert_real((double)plain.self.J[0] + mode[0] + (2.0 * mode[1]), r.self.J[0]);
+        assert_real(plain.self.J[1], r.self.J[1]);
+        assert_memory_equal(plain.self.r, r.self.r, 2U * sizeof(hg_real));
+    }
+    assert_untouched(&real[SM_REALS + 2U], 1U);
 }
 
 /* Only corrupted tables bring a number that is not finite as far as a generator. */
@@ -498,6 +545,7 @@ int main(void)
         cmocka_unit_test(a_lost_frame_takes_a_provisional_alarm_back),
         cmocka_unit_test(a_moving_start_shows_until_it_has_settled),
         cmocka_unit_test(restart_forgets_alarms),
+        cmocka_unit_test(a_threshold_with_modes_stands_beside_the_others),
         cmocka_unit_test(a_refused_generator_begins_again_and_the_others_go_on),
         cmocka_unit_test(two_detectors_share_tables_and_nothing_else),
         cmocka_unit_test(no_false_alarm_is_confirmed_whatever_is_lost),

@@ -19,6 +19,8 @@
 #include "hullguard/mismatch.h"
 #include "hullguard/decision.h"
 #include "hullguard/detector.h"
+#include "hullguard/uio.h"
+#include "hullguard/isolate.h"
 #include "hullguard/e2e.h"
 #include "hullguard/can.h"
 #include "hullguard/frame.h"

@@ -17,7 +17,7 @@ from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
 from hullguard.design.protection import ProtectionTable
-from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, SignalTable, Tables
+from hullguard.design.tables import BRS, EXTENDED, FD, FLOAT32, MOTOROLA, SIGNED, GeneratorTable, GroupTable, MessageTable, MismatchTable, ModalGeneratorTable, SignalTable, Tables
 from hullguard.design.zonotope_table import BALL, BOX, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 
@@ -416,7 +416,17 @@ def _hull(g: GeneratorTable, n: str, signals: Sequence[str]) -> list[str]:
         lines += table("hg_real", f"{n}_{part}", f"{g.settle}][{residuals}", rows, about)
         lines += table("hg_real", f"{n}_{part}_left", f"{residuals}", [reals(getattr(g, f"{part}_left"))], "what is left of the initial state then")
     lines += table("hg_real", f"{n}_bias", f"{residuals}", [reals(g.bias)], "threshold's part from disturbance and rounding from then on")
-    return lines + table("hg_real", f"{n}_decay", f"{residuals}", [reals(g.decay)], "by how much the part behind the taps shrinks in a sample")
+    lines += table("hg_real", f"{n}_decay", f"{residuals}", [reals(g.decay)], "by how much the part behind the taps shrinks in a sample")
+    return lines + (_hull_modes(g, n) if isinstance(g, ModalGeneratorTable) else [])
+
+
+def _hull_modes(g: ModalGeneratorTable, n: str) -> list[str]:
+    modes = len(g.mode_decay)
+    lines = table("hg_real", f"{n}_mode_decay", f"{modes}", [reals(g.mode_decay)], "what a mode has left after a sample")
+    lines += table("hg_real", f"{n}_mode_input", f"{modes}][{len(g.wide)}", [reals(r) for r in g.mode_input], "weight of a radius older than the taps in each mode")
+    lines += table("hg_real", f"{n}_mode_output", f"{len(g.output)}][{modes}", [reals(r) for r in g.mode_output], "residual units a unit of each mode")
+    lines += table("hg_real", f"{n}_mode_rest", f"{modes}", [reals(g.mode_rest)], "modes after a start within the initial range")
+    return lines + table("hg_real", f"{n}_mode_moving", f"{modes}", [reals(g.mode_moving)], "modes after a start in a moving plant")
 
 
 REDUCTIONS = {TRUNCATE: "HG_REDUCTION_TRUNCATE", BOX: "HG_REDUCTION_BOX", BALL: "HG_REDUCTION_BALL"}
@@ -561,7 +571,13 @@ def _generators(tables: Tables) -> list[str]:
             f"    {{.residuals = {len(g.output)}U, .width = {len(g.wide)}U, .exponent = {scaled(g.exponents[2])}, .signal = {n}_{'signal' if g.wide == g.signal else 'wide'},",
             f"     .taps = {n}_taps, .weight = {n}_weight, .settle = {g.settle}U, .rest = {n}_rest, .rest_left = {n}_rest_left,",
             f"     .moving = {n}_moving, .moving_left = {n}_moving_left, .bias = {n}_bias,",
-            f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay}},",
+            f"     .ready_rest = {g.ready_rest}U, .ready_moving = {g.ready_moving}U, .decay = {n}_decay{'' if isinstance(g, ModalGeneratorTable) else '}'},",
+        ]
+        if not isinstance(g, ModalGeneratorTable):
+            continue
+        lines += [
+            f"     .modes = {len(g.mode_decay)}U, .mode_decay = {n}_mode_decay, .mode_input = {n}_mode_input, .mode_output = {n}_mode_output,",
+            f"     .mode_rest = {n}_mode_rest, .mode_moving = {n}_mode_moving}},",
         ]
     return [*lines, "};", ""]
 

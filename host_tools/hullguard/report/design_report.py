@@ -21,6 +21,7 @@ from hullguard.design.protection import MODAL, NONE
 from hullguard.design.tables import GeneratorTable, MessageTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from hullguard.report import uio_design
 from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section, uncertain_names
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
@@ -64,6 +65,7 @@ def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
         yield from _generator(design, i, g)
         if folded:
             yield "</details>"
+    yield from uio_design.section(design)
     yield from banks_section(design)
     yield from isolability_section(design, pairs)
     yield from derived_section(design)
