@@ -46,6 +46,9 @@ int        qemu_plugin_version = 1;
 
 #define FUNCTIONS_MAX 4096
 #define DEPTH_MAX 64
+#define PAGE 4096U
+#define LONGEST 15U /* bytes of an instruction */
+#define NOWHERE UINT64_MAX
 
 typedef struct {
     uint64_t begin;
@@ -64,6 +67,7 @@ typedef struct {     /* a piece of code that runs from its first instruction to 
     uint64_t begin;
     uint64_t end;
     uint64_t instructions;
+    uint64_t doubted; /* where its last instruction begins, if that may not be part of it; or nowhere */
     int      entered; /* index of the function whose first instruction this is, or -1 */
 } piece;
 
@@ -73,7 +77,7 @@ static call     stack[DEPTH_MAX];
 static int      depth;
 static int      around; /* of them, those that are counted */
 static uint64_t retired;
-static uint64_t last_begin, last_end; /* of the piece that ran before */
+static uint64_t last_begin, last_end, last_doubted = NOWHERE; /* of the piece that ran before */
 static FILE    *calls;
 
 static void fail(const char *what)
@@ -127,6 +131,10 @@ static void on_piece(unsigned int vcpu, void *user)
 {
     const piece *const p = user;
     (void)vcpu;
+    if (p->begin == last_doubted) { /* it was not: it begins this piece */
+        retired--;
+        last_end = last_doubted;
+    }
     if (p->entered >= 0) {
         enter(p->entered); /* nobody returns to here, though the jump that ends the function before may look like a call from just before here */
     } else {
@@ -134,9 +142,11 @@ static void on_piece(unsigned int vcpu, void *user)
     }
     last_begin = p->begin;
     last_end = p->end;
+    last_doubted = p->doubted;
     retired += p->instructions;
 }
 
+/* A translator ends a piece before an instruction that lies in two pages, and x86's of QEMU 7.2 lists it all the same: the next piece begins with it. */
 static void on_translation(qemu_plugin_id_t id, struct qemu_plugin_tb *tb)
 {
     const size_t n = qemu_plugin_tb_n_insns(tb);
@@ -148,6 +158,8 @@ static void on_translation(qemu_plugin_id_t id, struct qemu_plugin_tb *tb)
     }
     *p = (piece){.begin = qemu_plugin_insn_vaddr(qemu_plugin_tb_get_insn(tb, 0U)), .instructions = n, .entered = -1};
     p->end = qemu_plugin_insn_vaddr(last) + qemu_plugin_insn_size(last);
+    const uint64_t from = qemu_plugin_insn_vaddr(last);
+    p->doubted = ((n > 1U) && ((from / PAGE) != ((from + LONGEST) / PAGE))) ? from : NOWHERE;
     for (int i = 0; i < count; i++) {
         if (functions[i].begin == p->begin) {
             p->entered = i;

@@ -7,12 +7,16 @@ import re
 import shlex
 import subprocess
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 TIMEOUT_S = 300.0
 LIBRARY = "firmware/src/"
+STEP = "hg_detector_step"
+REWIND = "hg_hold_past"
+HELPERS = ("linalg", "ring", "code", "trigger")  # modules that count for the part that calls them
 _SECTION = re.compile(r"^ (\S+)?\s+0x([0-9a-f]+)\s+0x([0-9a-f]+)\s+(\S+\.o\)?)$")
 _SYMBOL = re.compile(r"^\s*\d+: ([0-9a-f]+)\s+(\d+|0x[0-9a-f]+) FUNC\s+\S+\s+\S+\s+\S+\s+(\S+)")
 
@@ -45,19 +49,14 @@ class Function:
     end: int
     section: Section
 
-    @property
-    def own(self) -> bool:
-        """Whether it is the library's."""
-        return LIBRARY in self.section.source
-
 
 @dataclass
 class Call:
-    """One call of one of the library's functions."""
+    """One call of a function that is counted."""
 
     function: Function
     all: int  # instructions, those of callees too
-    self: int  # without those of callees of the library
+    self: int  # without those of counted callees
     calls: list[Call] = field(default_factory=list)
 
     def walk(self) -> Iterator[Call]:
@@ -93,11 +92,16 @@ def functions(elf: Path, cross: str) -> list[Function]:
     return [found[b] for b in sorted(found)]
 
 
-def count(elf: Path, cross: str, emulator: str, plugin: Path) -> tuple[str, list[Call]]:
-    """Run a program to its end; what it printed, and the outermost calls of the library's functions."""
+def of_library(function: Function) -> bool:
+    """Whether a function is the library's."""
+    return LIBRARY in function.section.source
+
+
+def count(elf: Path, cross: str, emulator: str, plugin: Path, counted: Callable[[Function], bool] = of_library) -> tuple[str, list[Call]]:
+    """Run a program to its end; what it printed, and the outermost calls of the functions that are counted, the library's."""
     listed = functions(elf, cross)
     names, calls = elf.with_suffix(".functions"), elf.with_suffix(".calls")
-    names.write_text("".join(f"{f.begin:x} {f.end:x} {int(f.own)}\n" for f in listed), encoding="utf-8")
+    names.write_text("".join(f"{f.begin:x} {f.end:x} {int(counted(f))}\n" for f in listed), encoding="utf-8")
     calls.unlink(missing_ok=True)
     machine = shlex.split(emulator)
     command = [machine[0], "-plugin", f"{plugin.resolve()},functions={names},calls={calls}", *machine[1:], str(elf)]
@@ -120,3 +124,27 @@ def tree(lines: list[str], listed: list[Function]) -> list[Call]:
         waiting[depth].append(Call(listed[index], with_callees, without, waiting[depth + 1]))
         waiting[depth + 1] = []
     return waiting[0]
+
+
+def found(calls: Sequence[Call], name: str) -> list[Call]:
+    """Every call of a function, in no more than the order in which they began within one outermost call."""
+    return [c for outer in calls for c in outer.walk() if c.function.name == name]
+
+
+def parts(call: Call, part: str = "") -> Counter[str]:
+    """Instructions of a call by the module they are spent for."""
+    module = call.function.section.module
+    mine = part if module in HELPERS and part else module
+    spent = Counter({mine: call.self})
+    for c in call.calls:
+        spent += parts(c, mine)
+    return spent
+
+
+def rows(head: Sequence[str], body: Sequence[Sequence[str]], left: int, markdown: bool) -> list[str]:
+    """Lines of a table whose first `left` columns hold words and the others numbers."""
+    if markdown:
+        rule = ["---" if i < left else "--:" for i in range(len(head))]
+        return ["| " + " | ".join(r) + " |" for r in (head, rule, *body)]
+    widths = [max(len(r[i]) for r in (head, *body)) for i in range(len(head))]
+    return ["  ".join(w.ljust(n) if i < left else w.rjust(n) for i, (w, n) in enumerate(zip(r, widths, strict=True))).rstrip() for r in (head, *body)]

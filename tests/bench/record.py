@@ -1,22 +1,26 @@
-"""record.py MODEL FILE: readings of a model's emulated plant as a C header for tests/bench/drive.c, in codes of the wire, and the counts that
-tests/bench/size_detector.c needs.
+"""record.py MODEL NAME FILE [KEY=VALUE..]: readings of a model's emulated plant as a C header for tests/bench/drive.c, in codes of the wire, and the
+counts that tests/bench/size_detector.c needs. Beside it, FILE.json: what each part of the detector cannot do without (needs.py). NAME is what the
+bench calls the model with these keys overridden.
 
 The plant of the model's first scenario runs without a fault until FAULT_AT; from there on with the scenario's own. Seeded: the same file every time.
 """
 
 from __future__ import annotations
 
+import json
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "host_tools"))
 
+from needs import needs
+
 from hullguard.core.library import library
 from hullguard.core.native import Native, Plant
-from hullguard.design.design import design
+from hullguard.design.design import Design, design
 from hullguard.design.tables import SignalTable
-from hullguard.model import load_model
+from hullguard.model import load_model, parse_override
 
 SAMPLES = 500
 FAULT_AT = 440
@@ -29,7 +33,7 @@ HEADER = """/* Readings of model {name}, and how much its detector holds, by tes
 
 #include "{name}.h"
 
-#define RECORD_NAME "{name}"
+#define RECORD_NAME "{title}"
 #define RECORD_SAMPLES {samples}U
 #define RECORD_FAULT_AT {fault_at}U
 #define RECORD_SIGNALS {signals}U
@@ -40,6 +44,14 @@ HEADER = """/* Readings of model {name}, and how much its detector holds, by tes
 #define RECORD_PREDICTORS {predictors}U
 #define RECORD_REALS {reals}U
 #define RECORD_SUMS {sums}U
+/* Of its first generator: shapes of a matrix with as many multiply-accumulates as threshold and residuals have. */
+#define RECORD_HULL_ROWS {hull_rows}
+#define RECORD_HULL_COLUMNS {hull_columns}
+#define RECORD_HULL_WIDTH {hull_width}
+#define RECORD_RESIDUAL_ROWS {residual_rows}
+#define RECORD_RESIDUAL_COLUMNS {residual_columns}
+#define RECORD_STATES {states}
+#define RECORD_MEASUREMENTS {measurements}
 #define record_config hg_{name}_config
 #define record_sender hg_{name}_sender
 #define record_node_start hg_{name}_node_start
@@ -61,9 +73,8 @@ def code_of(signal: SignalTable, reading: float) -> int:
     return min(max(round((reading - signal.offset) / signal.resolution), signal.minimum), signal.maximum)
 
 
-def record(name: str) -> str:
+def record(made: Design, title: str) -> str:
     """The header of a model."""
-    made = design(load_model(name))[0]
     scenario = made.model.scenarios[0]
     faults = [replace(fault, start=FAULT_AT, end=None) for fault in scenario.faults]
     native = Native(library("f64"), made.tables)
@@ -87,8 +98,26 @@ def record(name: str) -> str:
         "reals": detector.reals,
         "sums": detector.sums,
     }
-    return HEADER.format(name=made.model.name, codes="\n".join(lines), **counts)
+    g = made.tables.generators[0]
+    counts |= {
+        "hull_rows": len(g.output),
+        "hull_columns": needs(made.tables)["hull"].macs // len(g.output) if g.zonotope is None else 0,
+        "hull_width": len(g.wide),
+        "residual_rows": len(g.state) + len(g.output),
+        "residual_columns": len(g.state) + len(g.signal),
+        "states": len(g.state),
+        "measurements": sum(i in made.model.outputs for i in g.signal),
+    }
+    return HEADER.format(name=made.model.name, title=title, codes="\n".join(lines), **counts)
+
+
+def main() -> None:
+    """Both files."""
+    name, title, header, *words = sys.argv[1:]
+    made = design(load_model(name, dict(parse_override(word) for word in words)))[0]
+    Path(header).write_text(record(made, title), encoding="utf-8")
+    Path(f"{header}.json").write_text(json.dumps({part: asdict(need) for part, need in needs(made.tables).items()}), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    Path(sys.argv[2]).write_text(record(sys.argv[1]), encoding="utf-8")
+    main()

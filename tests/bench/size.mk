@@ -1,10 +1,16 @@
-# make size: flash, RAM and stack of every model on every target, beside the budget of tests/bench/budget.toml.
+# make size: flash, RAM and stack of every model on every target, beside the budget of tests/bench/budget.toml. The library is built with what
+# the model needs and no more: a model whose part is missing does not compile.
 # A number that grew fails; make size-budget takes today's numbers for the budget, to be looked at in the difference and committed.
 
 SIZE_PARTS := detector node sensor
 
-# The part of it in `make test`: the smallest core, one with an FPU, and another instruction set.
-SIZE_QUICK := cortex_m0 cortex_m4f rv32imac
+# The part of it in `make test`: two instruction sets, with an FPU and without.
+SIZE_QUICK := cortex_m4f rv32imac
+
+SIZE_CHOICE       := ZONOTOPE BANK PREDICT MISMATCH
+WITH_platoon_bank := BANK
+SIZE_SETS         := $(sort $(foreach m,$(MODELS),with_$(WITH_$(m))))
+size_flags         = $(foreach w,$(filter-out $(1:with_%=%),$(SIZE_CHOICE)),-DHG_WITH_$(w)=0)
 
 size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(MODELS),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
 size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
@@ -12,8 +18,8 @@ size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '
 
 .PHONY: size size-quick size-budget
 TEST_PARTS += size-quick
-size: $(call size_elfs,$(TARGETS)) ## flash, RAM and worst-case stack, beside their budget; JSON=1, FORMAT=markdown
-	@$(call size_run,$(TARGETS),$(if $(JSON),--json) $(if $(FORMAT),--format $(FORMAT)))
+size: $(call size_elfs,$(TARGETS)) ## flash, RAM and worst-case stack, beside their budget (JSON=1; FORMAT=markdown: of MODEL, short)
+	@$(call size_run,$(TARGETS),$(if $(JSON),--json) $(if $(FORMAT),--format $(FORMAT) --model $(MODEL)))
 size-quick: $(call size_elfs,$(SIZE_QUICK)) ## the same of a few targets
 	@$(call size_run,$(SIZE_QUICK),--quiet)
 size-budget: $(call size_elfs,$(TARGETS)) ## take today's sizes for the budget
@@ -24,12 +30,13 @@ define size_program
 OBJECTS += $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o
 $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o: tests/bench/size_$(4).c $(BENCH)/$(3)_record.h Makefile
 	@mkdir -p $$(@D)
-	$$(Q)$$(call bench_cc,$(1),$(2)) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
-$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(addprefix $(BENCH)/$(1)-$(2)/,$(3)/size_$(4).o $(addsuffix .o,$(basename $(LIB_SRC) $(if $(filter detector,$(4)),,firmware/models/$(3).c) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c))) hal/start/image.ld
+	$$(Q)$$(call bench_cc,$(1),$(2)) $(call size_flags,with_$(WITH_$(3))) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
+$(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(call bench_objects,$(1)-$(2),$(3)/size_$(4).o $(LIB_SRC:%=with_$(WITH_$(3))/%) $(if $(filter detector,$(4)),,$(3)/tables.o) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c) hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -Wl,-Map=$$(@:.elf=.map) -nostdlib -o $$@ $$(filter %.o,$$^) -lgcc
 endef
 
 define size_target
+$(foreach s,$(SIZE_SETS),$(eval $(call objects,$(BENCH)/$(1)-$(2)/$(s),$(LIB_SRC),$$(call bench_cc,$(1),$(2)) $(call size_flags,$(s)))))
 $(eval $(call objects,$(BENCH)/$(1)-$(2),tests/bench/size_port.c,$$(call bench_cc,$(1),$(2))))
 $(foreach m,$(MODELS),$(foreach p,$(SIZE_PARTS),$(eval $(call size_program,$(1),$(2),$(m),$(p)))))
 endef

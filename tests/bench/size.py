@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from counting import Section, sections
+from counting import Section, rows, sections
 from stack import StackError, compiled, deepest, run_time
 
 COLUMNS = ("code", "tables", "ram", "stack")
@@ -81,8 +81,8 @@ def symbols(elf: Path, cross: str) -> dict[str, int]:
 
 def stack(elf: Path, cross: str, part: str) -> tuple[int, tuple[str, ...]]:
     """The deepest of all calls that the program makes into the library."""
-    objects = [elf.with_name(f"size_{part}.ci"), *(elf.parents[1] / "firmware").rglob("*.ci"), *(elf.parents[1] / "hal/start").glob("memory.ci")]
-    graph = compiled(objects)
+    sources = {Path(s.source).with_suffix(".ci") for s in sections(elf.with_suffix(".map"))}
+    graph = compiled(file for file in sorted(sources) if file.exists())
     own = {name for name in graph if name == "main" or name.startswith(f"{PROGRAM}{part}.c:")}
     entries = {c for name in own for c in graph[name].calls} - own
     compiler = run_time(elf, cross, symbols(elf, cross))
@@ -134,14 +134,18 @@ def versions(crosses: Mapping[str, str]) -> dict[str, str]:
     return {cross.rstrip("-"): version for cross, version in ask.items()}
 
 
-def table(sizes: Sequence[Size], markdown: bool) -> list[str]:
+def table(sizes: Sequence[Size]) -> list[str]:
     """A row a program."""
-    head = ("target", "model", "part", "code", "tables", "RAM", "stack")
-    rows = [(s.target, s.model, s.part, *(str(n) for n in s.numbers.values())) for s in sizes]
-    if markdown:
-        return ["| " + " | ".join(r) + " |" for r in (head, ("---", "---", "---", "--:", "--:", "--:", "--:"), *rows)]
-    widths = [max(len(r[i]) for r in (head, *rows)) for i in range(len(head))]
-    return ["  ".join(w.ljust(n) if i < 3 else w.rjust(n) for i, (w, n) in enumerate(zip(r, widths, strict=True))) for r in (head, *rows)]
+    body = [(s.target, s.model, s.part, *(str(n) for n in s.numbers.values())) for s in sizes]
+    return rows(("target", "model", "part", "code", "tables", "RAM", "stack"), body, 3, False)
+
+
+def short(sizes: Sequence[Size], model: str) -> list[str]:
+    """Markdown of one model: a row a target, a column a program."""
+    mine = {(s.target, s.part): s for s in sizes if s.model == model}
+    targets, programs = list(dict.fromkeys(t for t, _ in mine)), list(dict.fromkeys(p for _, p in mine))
+    body = [(t, *(" / ".join(str(n) for n in mine[t, p].numbers.values()) for p in programs)) for t in targets]
+    return rows((f"{model}: code / tables / RAM / stack, bytes", *programs), body, 1, True)
 
 
 def main() -> int:
@@ -153,6 +157,7 @@ def main() -> int:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--quiet", action="store_true")
     parser.add_argument("--format", choices=("text", "markdown"), default="text")
+    parser.add_argument("--model", default="", help="the one that markdown tells of")
     parser.add_argument("program", nargs="+", type=Path)
     args = parser.parse_args()
     crosses = dict(word.split("=") for word in args.cross.split())
@@ -171,14 +176,14 @@ def main() -> int:
     if args.json:
         print(json.dumps([asdict(s) for s in sizes]))
     elif not args.quiet:
-        print("\n".join(table(sizes, args.format == "markdown")))
+        print("\n".join(short(sizes, args.model) if args.format == "markdown" else table(sizes)))
     if other := {name: version for name, version in found.items() if known.get(name) != version}:
         print(f"sizes are not judged: the budget is of {known}, and these are {other}", file=sys.stderr)
         return 0
     grown, shrunk = judged(sizes, budget)
     print("".join(f"{line}\n" for line in shrunk + grown), file=sys.stderr, end="")
     if not grown:
-        print(f"  ok  sizes of {len(sizes)} programs are within {args.budget}", file=sys.stderr if args.json else sys.stdout)
+        print(f"  ok  sizes of {len(sizes)} programs are within {args.budget}", file=sys.stderr if args.json or args.format == "markdown" else sys.stdout)
     return 1 if grown else 0
 
 

@@ -10,26 +10,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from counting import Call, CountError, count
-
-STEP = "hg_detector_step"
-REWIND = "hg_hold_past"
-HELPERS = ("linalg", "ring", "code", "trigger")  # they count for the part that calls them
-
-
-def parts(call: Call, part: str = "") -> Counter[str]:
-    """Instructions of a call by the module they are spent for."""
-    module = call.function.section.module
-    mine = part if module in HELPERS and part else module
-    spent = Counter({mine: call.self})
-    for c in call.calls:
-        spent += parts(c, mine)
-    return spent
-
-
-def found(calls: list[Call], name: str) -> list[Call]:
-    """Every call of a function."""
-    return [c for outer in calls for c in outer.walk() if c.function.name == name]
+from counting import REWIND, STEP, Call, CountError, count, found, parts
 
 
 def row(name: str, each: list[int], whole: float) -> str:
