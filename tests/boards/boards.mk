@@ -37,10 +37,12 @@ TEST_PARTS += boards-contract
 # The same suite on the host, against models of the registers: the drivers as they are for silicon, and errors, which no emulator makes.
 MODEL_DRIVER_ctucan := hal/ctucan/ctucan.c
 MODEL_DRIVER_zynqmp_r5 := hal/zynqmp_r5/zynqmp_can.c
+MODEL_SRC_BOARD := tests/contract/contract.c tests/boards/check.c tests/boards/contract_main.c tests/boards/model_board.c \
+                   hal/board/queue.c hal/board/say.c hal/board/controller.c hal/board/board.c
 MODEL_FLAGS = -DHG_REGISTERS_MODELLED=1 -Itests/boards/include -Itests/contract -Ihal/board
 define board_model
-$(eval $(call objects,$(BUILD)/boards/model/$(1)/$(2),tests/contract/contract.c tests/boards/check.c tests/boards/contract_main.c tests/boards/model_board.c tests/boards/model_$(2).c hal/board/queue.c hal/board/say.c $(MODEL_DRIVER_$(2)),$$(CC_$(1)) $$(MODEL_FLAGS) -Ihal/$(2)))
-$(BUILD)/boards/model/$(1)/$(2)/contract: $(patsubst %.c,$(BUILD)/boards/model/$(1)/$(2)/%.o,tests/contract/contract.c tests/boards/check.c tests/boards/contract_main.c tests/boards/model_board.c tests/boards/model_$(2).c hal/board/queue.c hal/board/say.c $(MODEL_DRIVER_$(2)))
+$(eval $(call objects,$(BUILD)/boards/model/$(1)/$(2),$(MODEL_SRC_BOARD) tests/boards/model_$(2).c $(MODEL_DRIVER_$(2)),$$(CC_$(1)) $$(MODEL_FLAGS) -Ihal/$(2)))
+$(BUILD)/boards/model/$(1)/$(2)/contract: $(patsubst %.c,$(BUILD)/boards/model/$(1)/$(2)/%.o,$(MODEL_SRC_BOARD) tests/boards/model_$(2).c $(MODEL_DRIVER_$(2)))
 	$$(Q)$$(CC_$(1)) -o $$@ $$^
 $(BUILD)/boards/model/$(1)/$(2)/contract.ok: $(BUILD)/boards/model/$(1)/$(2)/contract
 	@$$(call run_test,$$<,$$<)
