@@ -21,7 +21,7 @@ from hullguard.bus.candump import BRS, EXTENDED, FD, REMOTE
 from hullguard.bus.link import CanLink
 from hullguard.core.native import MOVING, Frame, Verdict
 from hullguard.errors import BusError
-from inside_support import Drive, collect, exchange, link, process, reachable, silent
+from inside_support import WAIT_S, Drive, collect, exchange, link, process, reachable, silent
 from node_support import command, hullguard
 from under_test import Linux, Mode, Running, Under, nodes, under
 
@@ -439,14 +439,16 @@ class Drill:
 
 @contextlib.contextmanager
 def flood(gap_ms: str, *identifiers: str) -> Iterator[None]:
-    """A process each that sends 8 random bytes under one identifier as fast as it can, or as the bus lets it."""
-    made = [subprocess.Popen(["cangen", "vcan0", "-g", gap_ms, "-i", "-I", i, "-L", "8"], stderr=subprocess.DEVNULL) for i in identifiers]
-    try:
+    """A process each that sends 8 random bytes under one identifier as fast as it can, or as the bus lets it, from the moment when each is heard."""
+    with contextlib.ExitStack() as stack:
+        for identifier in identifiers:
+            with raw(only=int(identifier, 16)) as ear:
+                ear.settimeout(WAIT_S)
+                babbler = subprocess.Popen(["cangen", "vcan0", "-g", gap_ms, "-i", "-I", identifier, "-L", "8"], stderr=subprocess.DEVNULL)
+                stack.callback(babbler.wait, 10)
+                stack.callback(babbler.terminate)
+                ear.recv(72)
         yield
-    finally:
-        for p in made:
-            p.terminate()
-            p.wait(10)
 
 
 def test_two_babblers_at_full_rate(ecu: Under) -> None:

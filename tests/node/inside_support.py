@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 import signal
 import subprocess
 import sys
@@ -56,14 +57,22 @@ class Process:
         self.lines, self.status = out.splitlines(), self.popen.returncode
 
 
+def _first_line(popen: subprocess.Popen[str]) -> str:
+    """Read past the stream's buffer, byte by byte: communicate() reads past it as well, and what was in it would be lost."""
+    assert popen.stdout is not None
+    line = b""
+    while not line.endswith(b"\n") and (byte := os.read(popen.stdout.fileno(), 1)):
+        line += byte
+    return line.decode()
+
+
 @contextlib.contextmanager
 def process(*command: object) -> Iterator[Process]:
     """A program that prints 'ready' first; stopped at the end unless it has been before."""
     popen = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment())
     made = Process(popen)
     try:
-        assert popen.stdout is not None
-        first = popen.stdout.readline()
+        first = _first_line(popen)
         if first != "ready\n":
             made.wait()
             raise AssertionError(f"{command}: said {first!r}, status {made.status}: {made.err}")
