@@ -8,6 +8,8 @@
 
 #include "hullguard/hullguard.h"
 
+#include "fusion_run.h"
+
 #define HGH_STATES_MAX 64
 #define HGH_SIGNALS_MAX 96
 #define HGH_DISTURBANCES_MAX 192
