@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ POSITION, VELOCITY = (0, 2), (1, 3)
 WEIGHT = (1.0, 0.0, 1.0, 0.0)
 RATE = 0.42  # frames a sensor and sample without the heartbeat's
 LOSSES = (0.05, 0.10, 0.15)
-NEVER = {"heartbeat": 250, "watchdog": 254}  # of a control without either
+NEVER: dict[str, Any] = {"heartbeat": 250, "watchdog": 254}  # of a control without either
 ORIGIN = (128.0, 0.0, 128.0, 0.0)  # m
 WIRE = 0.005  # m or m/s a code of 16 bits
 WINDOW, CONVERTER = 10, 0.001
@@ -50,7 +51,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Is it?"""
+        """Whether it is."""
         return self.low <= self.value <= self.high
 
     def __str__(self) -> str:
@@ -95,9 +96,9 @@ class Study:
         """For sensors that send whatever their trigger says: silence says nothing."""
         return Filter((design.plain_table(self.model, [1.0] * SENSORS),), heartbeat=1)
 
-    def run(self, chosen: Filter, sensor: Filter | None = None, runs: int = 0, **case: object) -> Outcome:
+    def run(self, chosen: Filter, sensor: Filter | None = None, runs: int = 0, **case: Any) -> Outcome:
         """A batch."""
-        return self.bench.run(chosen, Case(**{"samples": self.size.samples} | case), runs or self.size.runs, self.seed, sensor)  # type: ignore[arg-type]
+        return self.bench.run(chosen, Case(**({"samples": self.size.samples} | case)), runs or self.size.runs, self.seed, sensor)
 
     def _once(self, name: str, loss: float, make: Callable[[], Outcome]) -> Outcome:
         if (name, loss) not in self._kept:
@@ -116,7 +117,7 @@ class Study:
         """Error over that of periodic sending."""
         return outcome.rms(states) / self.periodic(loss).rms(states)
 
-    def tuned(self, make: Callable[[float], tuple[Filter, dict[str, object]]], rate: float) -> tuple[Filter, dict[str, object]]:
+    def tuned(self, make: Callable[[float], tuple[Filter, dict[str, Any]]], rate: float) -> tuple[Filter, dict[str, Any]]:
         """The threshold of a trigger that makes this rate: bisection over its logarithm, on few runs."""
         low, high = 1e-4, 1e2
         for _ in range(14):
@@ -151,7 +152,7 @@ def losses(study: Study) -> Iterator[Check]:
         yield Check("3", f"loss {loss:.0%}: share of samples within the NEES band", study.event(loss).inside(STATES), 0.88, 1.0)
 
 
-def published(study: Study, limit: float) -> tuple[Filter, dict[str, object]]:
+def published(study: Study, limit: float) -> tuple[Filter, dict[str, Any]]:
     """The source's trigger r^2 > limit R, the same for all sensors; silence says nothing, and there is no heartbeat."""
     return Filter((design.plain_table(study.model, limit * study.model.R),), "observation", **NEVER), {}
 
@@ -168,13 +169,13 @@ def controls(study: Study) -> Iterator[Check]:
     yield Check("4", "loss 15 % ignored (beta_0): mean NEES", study.run(Filter((trusting,)), loss=0.15).consistency, 4.4, 99.0)
 
 
-def stochastic(study: Study, level: float) -> tuple[Filter, dict[str, object]]:
+def stochastic(study: Study, level: float) -> tuple[Filter, dict[str, Any]]:
     """Closed-loop stochastic trigger, uniform; larger levels send more, hence the inverse."""
     share = [[design.beta_stochastic(1.0 / level, p)] * SENSORS for p in design.LOSS_RATES]
     return Filter((design.plain_table(study.model, [1.0 / level] * SENSORS, share),), "stochastic", **NEVER), {}
 
 
-def windowed(study: Study, detrended: bool, tau: float) -> tuple[Filter, dict[str, object]]:
+def windowed(study: Study, detrended: bool, tau: float) -> tuple[Filter, dict[str, Any]]:
     """Variance trigger at the sensors, var > tau R, heartbeat of 10 samples."""
     levels = tuple(design.variance_level(tau * r, WINDOW, CONVERTER, detrended) for r in study.model.R)
     chosen = Filter((design.plain_table(study.model, [1.0] * SENSORS),), "own")
@@ -185,7 +186,7 @@ def triggers(study: Study) -> Iterator[Check]:
     """5: with the right model no trigger beats periodic sending. And the ranges in which section 6 has each of them."""
     uniform = design.innovation_table(study.model, np.full(SENSORS, design.delta_of(RATE)), np.full(SENSORS, RATE))
     plan = design.scheduled(study.model, 0.44)
-    cases: dict[str, tuple[tuple[Filter, dict[str, object]], float, float]] = {
+    cases: dict[str, tuple[tuple[Filter, dict[str, Any]], float, float]] = {
         "innovation, uniform": ((Filter((uniform,)), {}), 1.05, 1.09),
         "stochastic": (study.tuned(lambda v: stochastic(study, v), RATE), 1.10, 1.15),
         "prediction variance": ((Filter((design.plain_table(study.model, plan.level),), "scheduled", **NEVER), {}), 1.15, 1.30),
@@ -200,7 +201,7 @@ def triggers(study: Study) -> Iterator[Check]:
 def dead_sensor(study: Study) -> Iterator[Check]:
     """8: the best sensor dies; the worst of what follows."""
     masked = Filter(design.masked_tables(study.model, RATE, WEIGHT))
-    case = {"fault": "dead", "fault_at": 100, "skip": 100 + 5 * masked.watchdog}
+    case: dict[str, Any] = {"fault": "dead", "fault_at": 100, "skip": 100 + 5 * masked.watchdog}
     guarded = study.run(masked, **case)
     blind = study.run(Filter((study.table(),), **NEVER), **case)
     yield Check("8", "dead sensor: mean NEES later", guarded.consistency, 0.0, 4.6)
@@ -231,14 +232,14 @@ def late_frames(fine: Study) -> Iterator[Check]:
 
 def manoeuvre(study: Study) -> Iterator[Check]:
     """11: both velocities jump by 3 m/s."""
-    case = {"jump_at": 200, "jump": (0.0, 3.0, 0.0, 3.0)}
+    case: dict[str, Any] = {"jump_at": 200, "jump": (0.0, 3.0, 0.0, 3.0)}
     event, periodic = study.run(study.usual, **case), study.run(study.always, send="always", **case)
     yield Check("11", "jump of 3 m/s: position error of the 40 samples from it on, over periodic", event.rms(POSITION, 200, 240) / periodic.rms(POSITION, 200, 240), 0.95, 1.05)
 
 
 def one_sided_loss(study: Study) -> Iterator[Check]:
     """13: frames that the centre alone loses; each frame carries the history of its sensor (frames of 7 bytes)."""
-    case = {"loss": 0.15, "lossy": "centre", "nodes": 2, "resolution": WIRE}
+    case: dict[str, Any] = {"loss": 0.15, "lossy": "centre", "nodes": 2, "resolution": WIRE}
     centre = Filter((study.table(),), depth=8, origin=ORIGIN)
     sensor = Filter((study.table(),), origin=ORIGIN)
     found = study.run(centre, sensor, recall=True, **case)
@@ -264,7 +265,7 @@ def judgement(study: Study) -> Iterator[Check]:
     yield Check("C", f"false alarms per 1e5 samples, {study.size.calm} samples", calm.blames * 1e5 / study.size.calm, 0.0, 1.0)
     for i in range(SENSORS):
         for kind, size in (("bias", 3.0 * SIGMA[i]), ("freeze", 0.0)):
-            case = {"samples": 150, "fault": kind, "fault_sensor": i, "fault_size": size, "fault_at": 100, "judge": JUDGE}
+            case: dict[str, Any] = {"samples": 150, "fault": kind, "fault_sensor": i, "fault_size": size, "fault_at": 100, "judge": JUDGE}
             found = study.run(study.usual, runs=study.size.faults, **case)
             right = [at >= 100 and who == 1 << i for at, who in zip(found.blamed_at, found.blamed, strict=True)]
             yield Check("C", f"sensor {i + 1}, {kind}{' of 3 sigma' if size else ''}: found within 50 samples", float(np.mean(right)), 0.95, 1.0)

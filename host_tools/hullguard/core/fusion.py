@@ -32,7 +32,7 @@ class Filter:
     watchdog: int = 30
     huber: float = 0.0
     origin: tuple[float, ...] = ()  # [n] steps; empty: none
-    loss: float = 0.0  # rate to begin with
+    loss: float = 0.05  # rate to begin with
     smoothing: float = 1.0 / 128.0
     rows: bool = False  # dense rows even where a selection would do
 

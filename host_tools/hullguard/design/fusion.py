@@ -54,12 +54,12 @@ class Fusion:
 
     @property
     def states(self) -> int:
-        """n."""
+        """Number of states n."""
         return len(self.A)
 
     @property
     def sensors(self) -> int:
-        """m."""
+        """Number of sensors m."""
         return len(self.C)
 
     def only(self, alive: Sequence[int]) -> Fusion:
@@ -220,7 +220,7 @@ def innovation_table(model: Fusion, delta: Array, rates: Array, alive: Sequence[
     return TriggerTable(sum(1 << i for i in numbers), tuple(level), relax, early)
 
 
-def plain_table(model: Fusion, level: Sequence[float], share: Sequence[Sequence[float]] | None = None) -> TriggerTable:
+def plain_table(model: Fusion, level: Sequence[float] | Array, share: Sequence[Sequence[float]] | None = None) -> TriggerTable:
     """Given thresholds; `share`: beta of each loss rate and sensor, None: silence says nothing."""
     none = tuple((SILENT,) * model.sensors for _ in LOSS_RATES)
     relax = none if share is None else tuple(tuple(relaxation(b) for b in row) for row in share)
