@@ -6,7 +6,11 @@
 
 #define DEPTH_MAX 14U         /* a stamp modulo 16 names 16 samples, and one of them is the next */
 #define STAMPS 16U
-#define SCALINGS 540U         /* by 4: more than the exponents of a double */
+#if HG_REAL_F64 /* scalings by 4 that take any number to 1 .. 4 */
+#define SCALINGS 540U
+#else
+#define SCALINGS 75U
+#endif
 #define PAST 8U               /* samples before a frame that it can speak of */
 #define PRIOR HG_REAL_C(16.0) /* frames that the loss rate to begin with is worth */
 #define STEPS_MAX HG_REAL_C(32767.0) /* of the origin in one sample: more is no motion but a state that is about to be lost */
@@ -261,7 +265,7 @@ static hg_real root(hg_real x)
             scaled *= HG_REAL_C(4.0);
             scale *= HG_REAL_C(0.5);
         } else {
-            break;
+            /* within 1 .. 4, where it stays */
         }
     }
     hg_real y = HG_REAL_C(2.0);
@@ -358,14 +362,14 @@ static void take_stock(hg_fusion *self, const hg_fusion_slot *slot)
         const hg_fusion_entry *entry = &slot->entry[i];
         hg_fusion_sensor *sensor = &self->sensor[i];
         if ((entry->known == HG_FUSION_VALUE) && entry->counted) {
-            const uint16_t next = (uint16_t)((uint16_t)sensor->counter + 1U);
-            const uint16_t gap = sensor->seen ? (uint16_t)(((uint16_t)(entry->counter + config->modulus) - next) % config->modulus) : 0U;
+            const uint32_t ahead = ((uint32_t)entry->counter + config->modulus) - sensor->counter; /* 1 .. 2 modulus - 1 */
+            const uint32_t gap = sensor->seen ? ((ahead - 1U) % config->modulus) : 0U;
             const hg_real weight = hg_real_max(config->smoothing, HG_REAL_C(1.0) / ((hg_real)sensor->frames + PRIOR));
-            for (uint16_t g = 0U; g < gap; g++) {
+            for (uint32_t g = 0U; g < gap; g++) {
                 sensor->loss += weight * (HG_REAL_C(1.0) - sensor->loss);
             }
             sensor->loss -= weight * sensor->loss;
-            saturating_add(&sensor->lost, gap);
+            saturating_add(&sensor->lost, (uint16_t)gap);
             saturating_add(&sensor->frames, 1U);
             sensor->counter = entry->counter;
             sensor->seen = true;
@@ -596,7 +600,7 @@ hg_status hg_fusion_receive(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t c
         return HG_E_REPEATED;
     }
     enter(self, lag, i, HG_FUSION_VALUE, y);
-    entry->counter = counter;
+    entry->counter = (uint8_t)((uint16_t)counter % config->modulus);
     entry->counted = true;
     if ((lag + (self->open ? 0U : 1U)) > config->delay) {
         saturating_add(&sensor->late, 1U);
@@ -613,7 +617,7 @@ hg_status hg_fusion_recall(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t sp
     }
     for (uint8_t b = 0U; (b < PAST) && reachable(self, (uint8_t)(lag + 1U + b)); b++) {
         const uint8_t past = (uint8_t)(lag + 1U + b);
-        const bool spoke = ((spoken >> b) & 1U) != 0U;
+        const bool spoke = (((uint32_t)spoken >> b) & 1U) != 0U;
         const bool unknown = slot_of(self, past)->entry[i].known == HG_FUSION_NOTHING;
         if (unknown && (!spoke)) {
             enter(self, past, i, HG_FUSION_SILENT, HG_REAL_ZERO);

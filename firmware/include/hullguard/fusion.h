@@ -208,7 +208,7 @@ hg_status hg_fusion_due(const hg_fusion *self, uint8_t i, hg_real y, hg_real dic
 /** Book a frame.
  *  @param[in] i        0 .. m - 1
  *  @param[in] stamp    sample of the measurement modulo 16
- *  @param[in] counter  0 .. modulus - 1; counts the sensor's frames
+ *  @param[in] counter  counts the sensor's frames, taken by the modulus
  *  @param[in] y        as received, relative to the origin as it was when the sample was opened
  *  @retval HG_OK          booked; filtered in by the next close
  *  @retval HG_E_STAMP     of a sample that is not held any more, or not yet
