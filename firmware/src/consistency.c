@@ -65,6 +65,7 @@ void hg_consistency_reset(hg_consistency *self)
     self->since = 0U;
     self->leader = 0U;
     self->leads = 0U;
+    self->rests = self->config->rest;
     self->blamed = 0U;
 }
 
@@ -143,19 +144,18 @@ static void look_for_leader(hg_consistency *self)
     self->leader = best;
 }
 
-uint16_t hg_consistency_step(hg_consistency *self)
+/* Move all hypotheses one sample on. */
+static void judge(hg_consistency *self)
 {
     const hg_consistency_config *config = self->config;
-    const uint8_t sensors = self->fusion->config->sensors;
     if (self->since >= config->stride) {
         self->onset = ((self->onset + 1U) < config->onsets) ? (uint8_t)(self->onset + 1U) : 0U;
         self->since = 0U;
         begin_onset(self, self->onset);
     }
     self->since++;
-    for (uint8_t i = 0U; i < sensors; i++) {
+    for (uint8_t i = 0U; i < self->fusion->config->sensors; i++) {
         hg_consistency_sensor *sensor = &self->sensor[i];
-        look_for_repeats(sensor, &self->fusion->record[i]);
         sensor->score = HG_REAL_ZERO;
         for (uint8_t onset = 0U; onset < config->onsets; onset++) {
             const uint16_t h = hypothesis(self, onset, i);
@@ -163,13 +163,27 @@ uint16_t hg_consistency_step(hg_consistency *self)
             follow(self, i, response(self, h), sum);
             sensor->score = hg_real_max(sensor->score, likelihood(sum, config->least[i]));
         }
-        if (sensor->equal >= config->repeats) {
-            self->blamed |= (uint16_t)(1UL << i);
-        }
     }
     look_for_leader(self);
     if (self->leads >= config->confirm) {
         self->blamed |= (uint16_t)(1UL << self->leader);
+    }
+}
+
+uint16_t hg_consistency_step(hg_consistency *self)
+{
+    for (uint8_t i = 0U; i < self->fusion->config->sensors; i++) {
+        hg_consistency_sensor *sensor = &self->sensor[i];
+        const uint16_t bit = (uint16_t)(1UL << i);
+        look_for_repeats(sensor, &self->fusion->record[i]);
+        if ((self->rests == 0U) && (sensor->equal >= self->config->repeats) && ((self->fusion->excluded & bit) == 0U)) {
+            self->blamed |= bit;
+        }
+    }
+    if (self->rests == 0U) {
+        judge(self);
+    } else {
+        self->rests--;
     }
     return self->blamed;
 }

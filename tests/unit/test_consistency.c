@@ -240,6 +240,25 @@ static void a_frozen_sensor_repeats_itself(void **state)
     p.score[1].equal = 255U;
     assert_count(2U, step(&p, 2U, y));
     assert_count(255U, p.score[1].equal);
+    hg_consistency_reset(&p.judge);
+    hg_fusion_exclude(&p.self, 1U, true);
+    assert_count(0U, step(&p, 2U, y)); /* who is out is not judged */
+}
+
+static void after_a_start_it_rests(void **state)
+{
+    (void)state;
+    static rig p;
+    hg_consistency_config c = usual;
+    c.rest = 5U;
+    c.confirm = 1U;
+    begin(&p, &filter, &c);
+    const hg_real y[SENSORS] = {R(90), R(-90), R(0)};
+    for (uint32_t k = 0U; k < 5U; k++) {
+        assert_count(0U, step(&p, 7U, y));
+        assert_real(0.0, p.sum[0].c);
+    }
+    assert_true(step(&p, 7U, y) != 0U);
 }
 
 int main(void)
@@ -252,6 +271,7 @@ int main(void)
         cmocka_unit_test(the_biased_sensor_is_blamed_and_no_other),
         cmocka_unit_test(a_lead_must_last),
         cmocka_unit_test(a_frozen_sensor_repeats_itself),
+        cmocka_unit_test(after_a_start_it_rests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

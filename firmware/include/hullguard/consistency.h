@@ -17,7 +17,8 @@
  *  noise does not repeat. A dead one is the watchdog's (hg_fusion_alive()).
  *
  *  It judges; hg_fusion_exclude() takes a sensor out, in all nodes in the same sample: every node runs this too, or one node tells the others.
- *  After an exclusion all hypotheses begin anew. Not reentrant per instance; safe in interrupt context; no allocation. */
+ *  After an exclusion all hypotheses begin anew, `rest` samples later: the estimate has yet to forget what the sensor did to it, or the next one that
+ *  contradicts it would be blamed for being right. A sensor that is out is not judged. Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_CONSISTENCY_H
 #define HULLGUARD_CONSISTENCY_H
 
@@ -32,6 +33,7 @@ typedef struct {            /* flash */
     hg_real limit;          /* > 0 */
     uint8_t confirm;        /* samples, >= 1 */
     uint8_t repeats;        /* equal values in a row, >= 2 */
+    uint8_t rest;           /* samples after a start or a reset in which nothing is judged */
 } hg_consistency_config;
 
 typedef struct {            /* RAM: one a hypothesis */
@@ -65,6 +67,7 @@ typedef struct {            /* RAM */
     uint8_t                      since;  /* samples ago */
     uint8_t                      leader; /* sensor that stands out */
     uint8_t                      leads;  /* samples in a row, saturated; 0: none does */
+    uint8_t                      rests;  /* samples in which nothing is judged yet */
     uint16_t                     blamed; /* bit i: sensor i, until hg_consistency_reset() */
 } hg_consistency;
 

@@ -83,6 +83,52 @@ class Native:
         return c
 
 
+class Node:
+    """One hg_fusion in this process. Vectors are [n], [m] arrays; P is [n, n]."""
+
+    def __init__(self, library: Library, model: Fusion, chosen: Filter) -> None:
+        self._native = Native(library)
+        self._lib, new = library.lib, self._native.new
+        self.config = self._native.filter(model, chosen)
+        n, m, slots = model.states, model.sensors, chosen.depth + 1
+        self._n = n
+        memory = new("hg_fusion_memory *")
+        memory.slot, memory.entry = new("hg_fusion_slot[]", slots), new("hg_fusion_entry[]", slots * m)
+        memory.sensor, memory.record, memory.origin = new("hg_fusion_sensor[]", m), new("hg_fusion_record[]", m), new("int32_t[]", n)
+        memory.real = new("hg_real[]", slots * (n * (n + 2)) + n * (3 * n + 5 + m))
+        self._ffi, self.node, self._none = library.ffi, new("hg_fusion *"), new("hg_real[]", 1)
+        status = self._lib.hg_fusion_start(self.node, self.config, memory)
+        if status != self._lib.HG_OK:
+            raise InputError(f"fusion: the library refused the configuration (status {status})")
+
+    def open(self) -> None:
+        """Predict the next sample."""
+        if self._lib.hg_fusion_open(self.node, self._none) != self._lib.HG_OK:
+            raise InputError("fusion: the sample before is still open; close it first")
+
+    def due(self, sensor: int, y: float, dice: float = 0.0) -> bool:
+        """Whether the sensor has to speak."""
+        return bool(self._lib.hg_fusion_due(self.node, sensor, y, dice) == self._lib.HG_OK)
+
+    def receive(self, sensor: int, stamp: int, counter: int, y: float) -> int:
+        """Book a frame; the library's status."""
+        return int(self._lib.hg_fusion_receive(self.node, sensor, stamp % 16, counter % 16, y))
+
+    def close(self) -> int:
+        """Filter in what is booked; the library's status."""
+        return int(self._lib.hg_fusion_close(self.node))
+
+    @property
+    def x(self) -> Array:
+        """Estimate, relative to the local origin."""
+        return np.array(self._ffi.unpack(self.node.x, self._n), dtype=float)
+
+    @property
+    def P(self) -> Array:
+        """Its covariance."""
+        return np.array(self._ffi.unpack(self.node.P, self._n * self._n), dtype=float).reshape(self._n, self._n)
+
+
 @dataclass(frozen=True)
 class Judge:
     """What hg_consistency_config says."""
@@ -93,6 +139,7 @@ class Judge:
     limit: float = 24.0
     confirm: int = 10
     repeats: int = 3
+    rest: int = 50
 
 
 @dataclass(frozen=True)
@@ -193,7 +240,7 @@ class Bench:
             j = c.consistency = new.new("hg_consistency_config *")
             j.onsets, j.stride, j.limit = case.judge.onsets, case.judge.stride, case.judge.limit
             j.least = new.reals(case.judge.least * np.sqrt(model.R))
-            j.confirm, j.repeats = case.judge.confirm, case.judge.repeats
+            j.confirm, j.repeats, j.rest = case.judge.confirm, case.judge.repeats, case.judge.rest
         if case.windows is not None:
             windows = new.new("hg_variance_config[]", model.sensors)
             c.variance, c.converter = windows, case.windows.converter

@@ -114,6 +114,7 @@ class MeanField:
     prior: Array  # P before the updates of a sample
     P: Array  # and after them
     wide: Array  # [m] sqrt(S_i of the prior / s_i when its turn comes): by how much the interval of silence is wider than delta then
+    worth: Array  # [m] variance of a measurement in every sample that would do the same
 
     def rms(self, states: Sequence[int]) -> float:
         """Predicted root of the sum of these states' mean squared errors."""
@@ -135,17 +136,17 @@ def _sample(model: Fusion, prior: Array, lam: Array, delta: Array, silence: bool
     return P, worth, wide
 
 
-def mean_field(model: Fusion, rates: Sequence[float] | Array, silence: bool = True, parallel: bool = False) -> MeanField:
+def mean_field(model: Fusion, rates: Sequence[float] | Array, silence: bool = True, parallel: bool = False, worth: Array | None = None) -> MeanField:
     """Steady state when sensor i speaks at rates[i].
 
     `silence`: whether silence is used. `parallel`: all triggers compare with the common prediction, so that an interval is wider than delta when sensors before it have
-    been fused; without, as in section 3, each compares with the estimate when its turn comes.
+    been fused; without, as in section 3, each compares with the estimate when its turn comes. `worth`: R' to begin with, of a state nearby.
 
     An update by the share eta of g g' / s is that of a measurement with R' = s / eta - C g: with all R' it is an algebraic Riccati equation, and R' settles in few rounds.
     """
     lam = np.clip(np.asarray(rates, dtype=float), 1e-6, 1.0 - 1e-6)
     delta = np.array([delta_of(r) for r in lam])
-    worth = model.R / lam
+    worth = model.R / lam if worth is None else worth
     for _ in range(ROUNDS_MAX):
         before = worth
         try:
@@ -154,7 +155,7 @@ def mean_field(model: Fusion, rates: Sequence[float] | Array, silence: bool = Tr
             raise InputError("fusion: the covariance does not settle; a state that no sensor sees grows for ever: add a sensor") from error
         P, worth, wide = _sample(model, prior, lam, delta, silence, parallel)
         if np.all(np.abs(worth - before) <= SETTLED * worth):
-            return MeanField(lam, delta, prior, P, wide)
+            return MeanField(lam, delta, prior, P, wide, worth)
     raise InputError(f"fusion: the mean covariance does not settle in {ROUNDS_MAX} rounds; choose rates further from 0")
 
 
@@ -165,8 +166,12 @@ def allocate(model: Fusion, rate: float, weight: Sequence[float] | Array, silenc
     w = np.asarray(weight, dtype=float)
     m = model.sensors
 
+    near: list[Array | None] = [None]
+
     def cost(lam: Array) -> float:
-        return float(w @ np.diag(mean_field(model, lam, silence).P))
+        found = mean_field(model, lam, silence, worth=near[0])
+        near[0] = found.worth
+        return float(w @ np.diag(found.P))
 
     scale = cost(np.full(m, rate))
     by_precision = np.clip(rate * m / model.R / (1.0 / model.R).sum(), 0.05, 0.95)
