@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from hullguard.core.fusion import Bench, Case, Filter, Judge, Outcome, Windows
+from hullguard.bus.bits import worst_bits
+from hullguard.core.fusion import Bench, Case, Filter, Judge, Node, Outcome, Windows
 from hullguard.core.library import library
 from hullguard.design import fusion as design
+from hullguard.design.protection import ProtectionTable
+from hullguard.design.tables import MessageTable
 
 SIGMA = np.array([0.1, 0.2, 0.15, 0.25, 0.18])  # m, m, m, m, m/s
 PLACES = (0, 0, 2, 2, 1)
@@ -66,10 +69,11 @@ class Size:
     samples: int
     faults: int  # runs a sensor with a faulty sensor
     calm: int  # samples without a fault that judge the judge
+    long: int  # samples of one course in two number types
 
 
-QUICK = Size(200, 400, 200, 100000)
-FULL = Size(1000, 400, 1000, 1000000)
+QUICK = Size(200, 400, 200, 100000, 2000)
+FULL = Size(1000, 400, 1000, 1000000, 100000)
 
 
 class Study:
@@ -260,6 +264,65 @@ def same_state(study: Study) -> Iterator[Check]:
     yield Check("12", "the same: steps that the origin has moved", float(found.origins), 1.0, math.inf)
 
 
+def precision(study: Study, samples: int, offset: float, rows: bool = False) -> Iterator[Check]:
+    """7: the same frames to a float32 and to a float64 filter, about so many metres from the origin, which does not move."""
+    rng = np.random.default_rng([study.seed, int(offset)])
+    model, chosen = study.model, Filter((study.table(),), rows=rows)
+    narrow, wide = Node(library("f32"), model, chosen), Node(library("f64"), model, chosen)
+    x, middle = model.x0.copy(), np.array([offset, 0.0, offset, 0.0])
+    counter = [0] * SENSORS
+    dP = dx = size = 0.0
+    for k in range(samples):
+        x = 0.995 * (model.A @ x + np.sqrt(np.diag(model.Q)) * rng.standard_normal(STATES))  # stays in its neighbourhood
+        y = (model.C @ (x + middle) + np.sqrt(model.R) * rng.standard_normal(SENSORS)).astype(np.float32).astype(float)
+        for node in (narrow, wide):
+            node.open()
+        for i in (i for i in range(SENSORS) if wide.due(i, y[i])):
+            counter[i] += 1
+            for node in (narrow, wide):
+                node.receive(i, k, counter[i], y[i])
+        for node in (narrow, wide):
+            node.close()
+        if k >= 50:
+            P, found = wide.P, wide.x
+            dP = max(dP, float(np.abs(narrow.P - P).max() / np.abs(P).max()))
+            dx, size = max(dx, float(np.abs(narrow.x - found).max())), max(size, float(np.abs(found).max()))
+    yield Check("7", f"float32 beside float64, {samples} samples, |x| <= {size:.0f} m: largest difference of P, relative", dP, 0.0, 1e-5)
+    yield Check("7", "the same: largest difference of x, 2^-23 |x|", dx / (float(np.finfo(np.float32).eps) * size), 0.0, 8.0)
+
+
+def same_errors(study: Study) -> Iterator[Check]:
+    """7: each number type with its own events."""
+    wide = Study(0.1, study.size, study.seed, "f64")
+    yield Check("7", "position error of float32 over float64's, each with its own events", study.event().rms(POSITION) / wide.event().rms(POSITION), 0.999, 1.001)
+
+
+@dataclass(frozen=True)
+class Wire:
+    """What sending costs: bits a sensor and sample on classic CAN with 11-bit identifiers, checksum, counter and stamp in every frame."""
+
+    what: str
+    length: int  # bytes of a frame
+    rate: float  # frames a sensor and sample
+    exact: float  # bits, mean of the frames sent
+    worst: float  # with the most stuff bits
+    position: float  # error over lossless periodic float32
+
+    def __str__(self) -> str:
+        return f"  {self.what:<34} {self.length} bytes  {self.rate:6.3f} frames  {self.exact:7.2f} bits  {self.worst:7.2f} at most   {self.position:6.3f}"
+
+
+def wire(study: Study) -> Iterator[Wire]:
+    """Periodic and event-triggered, float32 and 16 bits."""
+    protection = ProtectionTable("P22", 0, 8, 0, 12, "both", 0, tuple(range(16)), ())
+    for name, resolution, length in (("float32", 0.0, 6), (f"16 bits of {WIRE:g} m", WIRE, 4)):
+        most = worst_bits(MessageTable("fusion", 0x140, 0, length, protection))
+        for what, chosen, send in (("periodic", study.always, "always"), ("event-triggered", study.usual, "trigger")):
+            moving = replace(chosen, origin=ORIGIN)
+            found = study.run(moving, send=send, resolution=resolution)
+            yield Wire(f"{what}, {name}", length, found.rate, found.bits, found.rate * most, study.ratio(found))
+
+
 JUDGE = Judge()
 
 
@@ -282,5 +345,7 @@ def all_checks(size: Size, seed: int, real: str = "f32") -> Iterator[Check]:
     for part in (losses, controls, triggers, dead_sensor, outliers):
         yield from part(study)
     yield from late_frames(Study(STEP, size, seed, real))
-    for part in (manoeuvre, same_state, one_sided_loss, judgement):
+    for offset in (0.0, 5000.0):
+        yield from precision(study, size.long, offset)
+    for part in (same_errors, manoeuvre, same_state, one_sided_loss, judgement):
         yield from part(study)
