@@ -281,7 +281,7 @@ static uint16_t rate_row(const hg_fusion *self, uint8_t i)
     const hg_fusion_config *config = self->config;
     const hg_real nearest = (self->sensor[i].loss / config->rate_step) + HG_REAL_C(0.5);
     const uint8_t last = (uint8_t)(config->rates - 1U);
-    const uint8_t row = (nearest < (hg_real)last) ? (uint8_t)nearest : last;
+    const uint8_t row = (nearest < (hg_real)last) ? (uint8_t)(int32_t)nearest : last;
     return (uint16_t)((uint16_t)row * config->sensors) + i;
 }
 
@@ -443,13 +443,18 @@ void hg_fusion_reset(hg_fusion *self)
     self->open = false;
 }
 
+/* The whole number next to this one towards 0, within what an origin or a code can be away. */
+static hg_real whole(hg_real x)
+{
+    return (hg_real)(int32_t)hg_real_max(hg_real_min(x, STEPS_MAX), -STEPS_MAX);
+}
+
 /* Whole steps of the origin that state j is away; 0 within one step. */
 static hg_real steps_off(const hg_fusion_config *config, const hg_fusion_slot *slot, uint8_t j)
 {
     hg_real steps = HG_REAL_ZERO;
     if ((config->origin != NULL) && (config->origin[j] > HG_REAL_ZERO)) {
-        const hg_real off = hg_real_max(hg_real_min(slot->x[j] / config->origin[j], STEPS_MAX), -STEPS_MAX);
-        steps = (hg_real)(int32_t)off;
+        steps = whole(slot->x[j] / config->origin[j]);
     }
     return steps;
 }
@@ -606,6 +611,19 @@ hg_status hg_fusion_receive(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t c
         saturating_add(&sensor->late, 1U);
     }
     return HG_OK;
+}
+
+hg_real hg_fusion_unwrap(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y, hg_real period)
+{
+    const uint8_t lag = (uint8_t)((self->k - stamp) % STAMPS);
+    hg_real found = y;
+    if (lag < self->held) {
+        const hg_fusion_slot *slot = slot_of(self, lag);
+        const hg_real off = (slot->entry[i].reference + row_times(self->config, i, slot->shift)) - y;
+        const hg_real half = (off < HG_REAL_ZERO) ? HG_REAL_C(-0.5) : HG_REAL_C(0.5);
+        found = y + (whole((off / period) + half) * period);
+    }
+    return found;
 }
 
 hg_status hg_fusion_recall(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t spoken, hg_real previous)

@@ -5,6 +5,7 @@ and frames as long as they are on the wire.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -149,6 +150,17 @@ def test_late_frames() -> None:
 def test_a_manoeuvre_and_a_centre_that_loses_frames(tracking: study.Study) -> None:
     hold(study.manoeuvre(tracking))
     hold(study.one_sided_loss(tracking))
+
+
+def test_origins_that_differ_do_not_matter_to_codes_that_wrap(tracking: study.Study) -> None:
+    """A target that starts beside a step of the origin: a centre that loses frames takes the step in another sample than the sensors do."""
+    m = tracking.model
+    beside = design.Fusion(m.A, m.Q, m.C, m.R, m.x0 + np.array([118.0, 0.0, 118.0, 0.0]), m.P0)
+    case = Case(loss=0.15, lossy="centre", nodes=2, resolution=study.WIRE, recall=True)
+    sensor = Filter((tracking.table(),), origin=study.ORIGIN)
+    found = Bench(library("f32"), beside).run(replace(sensor, depth=8), case, 100, SEED, sensor)
+    assert found.origins > 100
+    assert tracking.ratio(found) < 1.18
 
 
 def test_all_nodes_are_in_the_same_state(tracking: study.Study) -> None:

@@ -217,6 +217,14 @@ hg_status hg_fusion_due(const hg_fusion *self, uint8_t i, hg_real y, hg_real dic
  *  Counted each in hg_fusion_sensor. Cost: n multiplications. */
 hg_status hg_fusion_receive(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t counter, hg_real y);
 
+/** A value whose code wraps round on the wire (16 bits of an absolute position): of all that it can stand for, the one nearest to what is predicted.
+ *  With an origin step that is a multiple of `period` it means the same to nodes whose origins differ, as they may where nodes do not hear the same frames.
+ *  @param[in] i, stamp  as in hg_fusion_receive()
+ *  @param[in] y         code times resolution
+ *  @param[in] period    2^bits times resolution, > 0
+ *  Result: for hg_fusion_receive() or hg_fusion_recall(); y itself when the sample is not held. Cost: one division. */
+hg_real hg_fusion_unwrap(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y, hg_real period);
+
 /** Book what a frame says of its sensor's past.
  *  @param[in] stamp     sample of that frame modulo 16
  *  @param[in] spoken    bit b: the sensor has sent a frame b + 1 samples before it; 0: it was silent by its trigger

@@ -30,7 +30,7 @@ RATE = 0.42  # frames a sensor and sample without the heartbeat's
 LOSSES = (0.05, 0.10, 0.15)
 NEVER: dict[str, Any] = {"heartbeat": 250, "watchdog": 254}  # of a control without either
 ORIGIN = (128.0, 0.0, 128.0, 0.0)  # m
-WIRE = 0.005  # m or m/s a code of 16 bits
+WIRE = 1.0 / 512.0  # m or m/s a code of 16 bits, which wrap round in 128
 WINDOW, CONVERTER = 10, 0.001
 STEP = 0.01  # seconds a sample, where 10 ms of delay are one sample
 
@@ -315,7 +315,7 @@ class Wire:
 def wire(study: Study) -> Iterator[Wire]:
     """Periodic and event-triggered, float32 and 16 bits."""
     protection = ProtectionTable("P22", 0, 8, 0, 12, "both", 0, tuple(range(16)), ())
-    for name, resolution, length in (("float32", 0.0, 6), (f"16 bits of {WIRE:g} m", WIRE, 4)):
+    for name, resolution, length in (("float32", 0.0, 6), ("16 bits of 2 mm", WIRE, 4)):
         most = worst_bits(MessageTable("fusion", 0x140, 0, length, protection))
         for what, chosen, send in (("periodic", study.always, "always"), ("event-triggered", study.usual, "trigger")):
             moving = replace(chosen, origin=ORIGIN)

@@ -25,8 +25,7 @@ typedef struct {          /* a sensor outside its filter */
     int16_t     window[UINT8_MAX];
     uint8_t     counter;
     uint8_t     spoken;   /* bit b: sent b + 1 samples ago */
-    hg_real     previous; /* value of the last frame, and */
-    double      previous_origin;
+    hg_real     previous; /* value in the last frame */
     double      frozen;
     bool        waits;    /* a frame is on its way for one more sample */
     hg_real     late_y;
@@ -181,31 +180,35 @@ static bool wants(runner *r, int32_t i, int64_t k, double y, hg_real local)
     }
 }
 
-/* The frame on the wire, its length, and the value as it comes out of it. */
-static hg_real transmit(runner *r, int32_t i, int64_t k, double y, double origin, double *bits)
+#define CODES 65536.0 /* of 16 bits */
+
+/* 16 bits of an absolute value: what it wraps round to. */
+static uint16_t wrapped(double y, double resolution)
+{
+    return (uint16_t)((int64_t)llrint(y / resolution) & 0xFFFF);
+}
+
+/* The frame on the wire, its length, and the value in it: relative to the sender's origin as float32, wrapped round in 16 bits. */
+static hg_real transmit(const runner *r, int32_t i, int64_t k, double y, double origin, double *bits)
 {
     const hgh_fusion_config *c = r->config;
     const sensor *s = &r->sensor[i];
-    hg_can_frame frame = {.id = ID_FIRST + (uint32_t)i, .flags = 0U, .length = 6U};
-    hg_real received;
+    hg_can_frame frame = {.id = ID_FIRST + (uint32_t)i, .flags = 0U, .length = (c->resolution > 0.0) ? 4U : 6U};
+    uint32_t raw;
+    hg_real value;
     if (c->resolution > 0.0) {
-        const int16_t code = (int16_t)fmax(fmin((double)lrint((y - origin) / c->resolution), 32767.0), -32767.0);
-        const uint16_t raw = (uint16_t)code;
-        frame.data[2] = (uint8_t)raw;
-        frame.data[3] = (uint8_t)(raw >> 8);
-        frame.length = 4U;
-        received = (hg_real)((double)code * c->resolution);
+        raw = wrapped(y, c->resolution);
+        value = (hg_real)((double)(int16_t)raw * c->resolution);
     } else {
-        const float value = (float)(y - origin);
-        uint32_t raw;
-        memcpy(&raw, &value, sizeof raw);
-        for (int32_t b = 0; b < 4; b++) {
-            frame.data[2 + b] = (uint8_t)(raw >> (8 * b));
-        }
-        received = (hg_real)value;
+        const float narrow = (float)(y - origin);
+        memcpy(&raw, &narrow, sizeof raw);
+        value = (hg_real)narrow;
     }
-    if (c->recall != 0) { /* history and the value before, of 16 bits whatever this one has */
-        const uint16_t before = (c->resolution > 0.0) ? (uint16_t)(int16_t)lrint((double)s->previous / c->resolution) : 0U;
+    for (uint32_t b = 2U; b < frame.length; b++) {
+        frame.data[b] = (uint8_t)(raw >> (8U * (b - 2U)));
+    }
+    if (c->recall != 0) { /* of 16 bits, whatever the value itself has */
+        const uint16_t before = isfinite(s->previous) ? wrapped((double)s->previous, c->resolution) : 0U;
         frame.data[frame.length] = s->spoken;
         frame.data[frame.length + 1U] = (uint8_t)before;
         frame.data[frame.length + 2U] = (uint8_t)(before >> 8);
@@ -213,20 +216,39 @@ static hg_real transmit(runner *r, int32_t i, int64_t k, double y, double origin
     }
     (void)hg_e2e_protect(&protection, frame.data, frame.length, s->counter, (uint8_t)(k & 15));
     *bits = (double)hgh_frame_bits(&frame);
-    return received;
+    return value;
 }
 
-/* A frame as nodes hear it. `own`: the sender's node; `late`: those that have it already do not want it again. */
-static void deliver(runner *r, int32_t i, int64_t k, uint8_t counter, hg_real y, bool own, bool others, bool centre)
+/* A value of sample k as this node takes it. */
+static hg_real decoded(const runner *r, const node *at, int32_t i, int64_t k, hg_real value)
+{
+    const double period = CODES * r->config->resolution;
+    return (period > 0.0) ? hg_fusion_unwrap(&at->filter, (uint8_t)i, (uint8_t)(k & 15), value, (hg_real)period) : value;
+}
+
+/* What a frame of sample k says of the samples before. */
+static void recall(const runner *r, node *at, int32_t i, int64_t k)
+{
+    const sensor *s = &r->sensor[i];
+    int64_t back = 1;
+    while ((back < 8) && (((s->spoken >> (back - 1)) & 1) == 0)) {
+        back++;
+    }
+    (void)hg_fusion_recall(&at->filter, (uint8_t)i, (uint8_t)(k & 15), s->spoken, decoded(r, at, i, k - back, s->previous));
+}
+
+/* A frame as nodes hear it: its sender's, the centre, the others. */
+static void deliver(runner *r, int32_t i, int64_t k, uint8_t counter, hg_real value, bool own, bool others, bool centre)
 {
     const int32_t mine = (int32_t)(node_of(r, i) - r->node);
     for (int32_t j = 0; j < r->config->nodes; j++) {
+        node *at = &r->node[j];
         const bool hears = (j == 0) ? ((mine == 0) ? own : (others && centre)) : ((j == mine) ? own : others);
         if (hears) {
-            (void)hg_fusion_receive(&r->node[j].filter, (uint8_t)i, (uint8_t)(k & 15), counter, y);
+            (void)hg_fusion_receive(&at->filter, (uint8_t)i, (uint8_t)(k & 15), counter, decoded(r, at, i, k, value));
         }
         if (hears && (r->config->recall != 0)) {
-            (void)hg_fusion_recall(&r->node[j].filter, (uint8_t)i, (uint8_t)(k & 15), r->sensor[i].spoken, r->sensor[i].previous);
+            recall(r, at, i, k);
         }
     }
 }
@@ -255,7 +277,6 @@ static void sense(runner *r, int32_t i, int64_t k)
         s->late_y = received;
         s->late_counter = s->counter;
         s->previous = received;
-        s->previous_origin = origin;
     }
     s->spoken = (uint8_t)((s->spoken << 1) | (speaks ? 1U : 0U));
 }

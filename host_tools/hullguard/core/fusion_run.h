@@ -31,8 +31,8 @@ typedef struct {
     int32_t                      lossy;        /* HGH_LOSS_*: who does not hear a lost frame */
     double                       loss;         /* probability that a frame is lost */
     double                       late;         /* probability that it is heard one sample late, by all but its sender */
-    int32_t                      recall;       /* 1: every frame says which of the 8 samples before had one, and the last of their values */
-    double                       resolution;   /* of 16-bit values on the wire, signal units; 0: float32 */
+    int32_t                      recall;       /* 1: every frame of 16 bits says which of the 8 samples before had one, and the last of their values */
+    double                       resolution;   /* of 16-bit values on the wire, signal units, which wrap round; 0: float32, relative to the sender's origin */
     double                       outlier;      /* probability of an outlier and */
     double                       outlier_size; /* its size, standard deviations of the sensor */
     int64_t                      jump_at;      /* sample in which the state jumps, negative for never */
