@@ -20,7 +20,7 @@ UNIT_SLOW  := test_adversary test_e2e_errors test_robust test_zonotope
 UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TESTS)/$(t)/%.ok,$(filter-out $(UNIT_SLOW),$(UNIT_TESTS))))
 
 # What a program is made of beside its test: by the C library of its target.
-CORPUS_SRC        := tests/target/corpus.c $(MODEL_SRC)
+CORPUS_SRC        := tests/target/corpus.c tests/target/corpus_fusion.c $(MODEL_SRC)
 NODE_SRC          := firmware/apps/detector_main.c tests/target/board_script.c firmware/models/platoon.c
 CONSOLE_none      := tests/target/console_semihosting.c hal/semihosting/semihosting.c
 CONSOLE_newlib    := $(CONSOLE_none)
