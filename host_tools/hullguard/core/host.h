@@ -8,6 +8,10 @@
 
 #include "hullguard/hullguard.h"
 
+#if !HG_REAL_Q31
+#include "fusion_run.h"
+#endif
+
 #define HGH_STATES_MAX 64
 #define HGH_SIGNALS_MAX 96
 #define HGH_DISTURBANCES_MAX 192
