@@ -63,7 +63,8 @@ def problem(number: int) -> Problem:
     derived = rng.standard_normal((s, q)) / radius[m + p :]
     ranges = hull.Ranges(x * rng.uniform(0.0, 0.1), x, WIDEST / 2 * radius[: m + p], WIDEST / 2 * radius[m : m + p], WIDEST * radius[m + p :])
     expected = hull.Expected(radius, radius * rng.uniform(1.0, 30.0, len(radius)), tuple(int(t) for t in rng.integers(1, 12, len(radius))))
-    tables = hull.build(lin, np.eye(s), plant, ranges, expected, "random", derived)
+    given = hull.Given(np.eye(s), plant, ranges, expected, derived)
+    tables = hull.build(lin, given, "random")
     Bd, Dd = plant.Ed - lin.input[:, :m] @ plant.Fd, lin.direct[:, :m] @ plant.Fd
     exact = exact_responses(lin, np.hstack([lin.input, derived]), np.hstack([lin.direct, np.zeros((residuals, q))]), ranges, Bd, Dd)
     return Problem(lin, ranges, expected, tables, *exact)
@@ -85,9 +86,10 @@ def thresholds(tables: hull.HullTables, start: str, radius: Array, real: str) ->
     residuals, width = tables.tail.shape
     settle = tables.settle
     pairs = [range(i, min(i + 2, residuals)) for i in range(0, residuals, 2)]
-    weight = [float(tables.weight[lag, i, g]) for pair in pairs for g in range(width) for lag in range(tables.taps[g]) for i in pair]
+    whole = [np.concatenate([tables.weight[: tables.taps[g], :, g], tables.tail[None, :, g]]) for g in range(width)]
+    weight = [float(lag[i]) for pair in pairs for g in range(width) for lag in whole[g] for i in pair]
     table = {"weight": weight, "rest": tables.rest[:settle], "moving": tables.moving[:settle]}
-    table |= {key: getattr(tables, key) for key in ("rest_left", "moving_left", "bias", "decay", "tail")}
+    table |= {key: getattr(tables, key) for key in ("rest_left", "moving_left", "bias", "decay")}
     keep = {key: ffi.new("hg_real[]", np.ravel(value).tolist()) for key, value in table.items()}
     keep |= {"signal": ffi.new("uint8_t[]", list(range(width))), "taps": ffi.new("uint8_t[]", list(tables.taps))}
     config = ffi.new("hg_hull_config *", {"residuals": residuals, "width": width, "settle": settle, **keep})
