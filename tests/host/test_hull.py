@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from host_support import REALS, SEED
+from host_support import FLOATS, SEED
 from hullguard.core.library import library
 from hullguard.design import hull
 from hullguard.design.arith import nearest32
@@ -133,7 +133,7 @@ def lowest(p: Problem, tables: hull.HullTables, real: str) -> float:
     return min(float((thresholds(tables, start, radius, real)[0] / exact - 1).min()) for start, radius, exact in found)
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 def test_no_threshold_is_below_the_exact_hull(problems: list[Problem], real: str) -> None:
     for i, p in enumerate(problems):
         assert lowest(p, p.tables, real) >= 0, f"problem {i}"
@@ -186,7 +186,7 @@ def test_what_a_tail_takes_over_of_a_start_adds_no_more_than_its_share(problems:
         assert np.all(theta - above <= hull.START_SHARE * (p.tables.steady + above) * (1 + 1e-3))
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 def test_a_threshold_at_usual_radii_is_the_hull_and_its_shares(problems: list[Problem], real: str) -> None:
     """After the start, and with the constant of rounding that a generator of such ranges needs."""
     for p in problems:
