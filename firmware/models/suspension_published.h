@@ -16,7 +16,8 @@
 #error "model suspension_published needs HG_GROUP_SIGNALS_MAX of at least 3"
 #endif
 #if HG_REAL_Q31
-#error "suspension_published.toml: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32"
+#error "suspension_published.toml: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use \
+       float32"
 #endif
 
 #ifdef __cplusplus

@@ -23,7 +23,8 @@ from hullguard.model import load_model, parse_fault
 from hullguard.model.schema import Reference
 
 SEED = int(os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little"))
-REALS = ("f32", "f64")
+FLOATS = ("f32", "f64")
+REALS = (*FLOATS, "q31")
 SILENT_1 = {"groups.measurement.trigger.silence": 1}
 SILENT_2 = {"groups.measurement.trigger.silence": 2}
 PERIODIC = {"groups.measurement.trigger.interval_max": 1}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from host_support import REALS, SEED
+from host_support import FLOATS, SEED
 from hullguard.core.library import library
 from hullguard.design import hull
 from hullguard.design.arith import nearest32
@@ -27,12 +27,21 @@ class Problem:
     """A generator without mismatch (T = 1, A = G + Ly C, F = -Dy C), its tables, and what is exact (float64, by the equations at the top of hull.py)."""
 
     lin: hull.Linear
-    ranges: hull.Ranges
-    expected: hull.Expected
+    given: hull.Given
     tables: hull.HullTables
     response: Array  # LAGS x residuals x signals: |h|
     driven: Array  # LAGS x residuals: disturbances up to a sample
     added: dict[str, Array]  # LAGS x residuals: initial state, by start
+
+    @property
+    def ranges(self) -> hull.Ranges:
+        """Largest magnitudes."""
+        return self.given.ranges
+
+    @property
+    def expected(self) -> hull.Expected:
+        """Usual and late radii."""
+        return self.given.expected
 
 
 def exact_responses(lin: hull.Linear, entering: Array, at_once: Array, ranges: hull.Ranges, Bd: Array, Dd: Array) -> tuple[Array, Array, dict[str, Array]]:
@@ -63,10 +72,11 @@ def problem(number: int) -> Problem:
     derived = rng.standard_normal((s, q)) / radius[m + p :]
     ranges = hull.Ranges(x * rng.uniform(0.0, 0.1), x, WIDEST / 2 * radius[: m + p], WIDEST / 2 * radius[m : m + p], WIDEST * radius[m + p :])
     expected = hull.Expected(radius, radius * rng.uniform(1.0, 30.0, len(radius)), tuple(int(t) for t in rng.integers(1, 12, len(radius))))
-    tables = hull.build(lin, np.eye(s), plant, ranges, expected, "random", derived)
+    given = hull.Given(np.eye(s), plant, ranges, expected, derived)
+    tables = hull.build(lin, given, "random")
     Bd, Dd = plant.Ed - lin.input[:, :m] @ plant.Fd, lin.direct[:, :m] @ plant.Fd
     exact = exact_responses(lin, np.hstack([lin.input, derived]), np.hstack([lin.direct, np.zeros((residuals, q))]), ranges, Bd, Dd)
-    return Problem(lin, ranges, expected, tables, *exact)
+    return Problem(lin, given, tables, *exact)
 
 
 def summed(response: Array, radius: Array) -> Array:
@@ -79,27 +89,37 @@ def exact_hull(p: Problem, start: str, radius: Array) -> Array:
     return np.asarray(summed(p.response, radius) + (p.driven + p.added[start])[: len(radius)])
 
 
-def thresholds(tables: hull.HullTables, start: str, radius: Array, real: str) -> tuple[Array, Array]:
-    """J and theta of the C library, samples x residuals. The tables are laid out as hull.h says, not by the design's own code."""
+def thresholds(tables: hull.HullTables, start: str, radius: Array, real: str, exponent: int = 0) -> tuple[Array, Array]:
+    """J and theta of the C library, samples x residuals. The tables are laid out as hull.h says, not by the design's own code.
+
+    In fixed point all numbers are in units, which they do not reach; `exponent` is that of the weights.
+    """
     lib, ffi = library(real).lib, library(real).ffi
+
+    def numbers(values: Array) -> list[float]:
+        flat = np.ravel(values)
+        return [round(x * 2**31) for x in flat.tolist()] if real == "q31" else list(flat.tolist())
+
+    one = 2.0**-31 if real == "q31" else 1.0
     residuals, width = tables.tail.shape
     settle = tables.settle
     pairs = [range(i, min(i + 2, residuals)) for i in range(0, residuals, 2)]
-    weight = [float(tables.weight[lag, i, g]) for pair in pairs for g in range(width) for lag in range(tables.taps[g]) for i in pair]
+    whole = [np.concatenate([tables.weight[: tables.taps[g], :, g], tables.tail[None, :, g]]) for g in range(width)]
+    weight = [float(lag[i]) for pair in pairs for g in range(width) for lag in whole[g] for i in pair]
     table = {"weight": weight, "rest": tables.rest[:settle], "moving": tables.moving[:settle]}
-    table |= {key: getattr(tables, key) for key in ("rest_left", "moving_left", "bias", "decay", "tail")}
-    keep = {key: ffi.new("hg_real[]", np.ravel(value).tolist()) for key, value in table.items()}
+    table |= {key: getattr(tables, key) for key in ("rest_left", "moving_left", "bias", "decay")}
+    keep = {key: ffi.new("hg_real[]", numbers(np.asarray(value))) for key, value in table.items()}
     keep |= {"signal": ffi.new("uint8_t[]", list(range(width))), "taps": ffi.new("uint8_t[]", list(tables.taps))}
-    config = ffi.new("hg_hull_config *", {"residuals": residuals, "width": width, "settle": settle, **keep})
+    config = ffi.new("hg_hull_config *", {"residuals": residuals, "width": width, "settle": settle, "exponent": exponent, **keep})
     ring, self, length = ffi.new("hg_ring *"), ffi.new("hg_hull *"), max(tables.taps) + 1
     memory, theta, J = ffi.new("hg_real[]", width * length), ffi.new("hg_real[]", residuals), ffi.new("hg_real[]", residuals)
     assert lib.hg_ring_start(ring, width, length, memory) == lib.HG_OK
     assert lib.hg_hull_start(self, config, ring, STARTS.index(start), theta) == lib.HG_OK
     out = np.zeros((2, len(radius), residuals))
-    for k, row in enumerate(radius.tolist()):
-        assert lib.hg_ring_push(ring, ffi.new("hg_real[]", row)) == lib.HG_OK
+    for k, row in enumerate(radius):
+        assert lib.hg_ring_push(ring, ffi.new("hg_real[]", numbers(row))) == lib.HG_OK
         lib.hg_hull_step(self, ring, J)
-        out[:, k] = list(J), list(theta)
+        out[:, k] = np.array([list(J), list(theta)]) * one
     return out[0], out[1]
 
 
@@ -131,7 +151,7 @@ def lowest(p: Problem, tables: hull.HullTables, real: str) -> float:
     return min(float((thresholds(tables, start, radius, real)[0] / exact - 1).min()) for start, radius, exact in found)
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 def test_no_threshold_is_below_the_exact_hull(problems: list[Problem], real: str) -> None:
     for i, p in enumerate(problems):
         assert lowest(p, p.tables, real) >= 0, f"problem {i}"
@@ -184,7 +204,7 @@ def test_what_a_tail_takes_over_of_a_start_adds_no_more_than_its_share(problems:
         assert np.all(theta - above <= hull.START_SHARE * (p.tables.steady + above) * (1 + 1e-3))
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 def test_a_threshold_at_usual_radii_is_the_hull_and_its_shares(problems: list[Problem], real: str) -> None:
     """After the start, and with the constant of rounding that a generator of such ranges needs."""
     for p in problems:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
-from host_support import REALS, SEED, Models
+from host_support import FLOATS, SEED, Models
 from hullguard.core.library import Library, library
 from hullguard.core.zonotope import fill
 from hullguard.design import hull, zonotope
@@ -116,7 +116,7 @@ def linears() -> list[tuple[hull.Linear, Array, np.random.Generator]]:
     return made
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_a_sound_zonotope_is_never_below_the_exact_sum(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     for lin, radius, rng in linears:
@@ -127,7 +127,7 @@ def test_a_sound_zonotope_is_never_below_the_exact_sum(linears: list[tuple[hull.
         assert np.all(found >= least), (lin, columns, (found / least).min())
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_without_reduction_it_is_the_exact_sum(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     over = []
@@ -169,7 +169,7 @@ def test_truncation_falls_below_the_exact_sum(linears: list[tuple[hull.Linear, A
     assert below > len(linears) / 3
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_late_radii_are_as_sound_as_radii_from_the_start(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     for lin, radius, rng in linears:
@@ -283,7 +283,7 @@ def delays(made: Design, traces: list[dict[str, Array]], table: ZonotopeTable, r
     return early, float(np.mean(late)) if late else np.inf, missed
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("start", [0, 1])
 @pytest.mark.parametrize("published", [False, True])
 def test_disturbances_and_the_initial_set_are_never_below_their_exact_sum(models: Models, real: str, start: int, published: bool) -> None:
@@ -313,7 +313,7 @@ def faulty(models: Models) -> dict[float, list[dict[str, Array]]]:
     return made
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_twelve_columns_find_faults_of_the_platoon_as_early_as_the_exact_hull(models: Models, faulty: dict[float, Any], real: str, reduction: int) -> None:
     made = models.design()
@@ -325,7 +325,7 @@ def test_twelve_columns_find_faults_of_the_platoon_as_early_as_the_exact_hull(mo
         assert np.mean(hulls) <= late + 1e-9 <= np.mean(hulls) + limit
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 def test_boxes_with_disturbances_as_columns_are_as_late_as_published_ones(models: Models, faulty: dict[float, Any], real: str) -> None:
     """Section 6: 17.1 / 14.4 and 8.7 / 7.5 for q = 12 / 48 with columns ordered by Euclid's norm; by what a box loses it is earlier."""
     made = models.design()

@@ -158,7 +158,7 @@ def _limits(tables: Tables) -> list[str]:
             lines += [f"#if !HG_WITH_{part}", f'#error "model {tables.name} needs HG_WITH_{part}"', "#endif"]
     if tables.fixed is None:
         reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
-        lines += ["#if HG_REAL_Q31", f'#error "{reason}"', "#endif"]
+        lines += ["#if HG_REAL_Q31", *" \\\n       ".join(textwrap.wrap(f'#error "{reason}"', WIDTH - 9, break_long_words=False)).splitlines(), "#endif"]
     return [*lines, ""] if lines else []
 
 
@@ -282,7 +282,7 @@ def _header(design: Design, names: Names) -> str:
 
 def _distinct(model: str, names: Names) -> None:
     """Refuse a signal whose constant would be another constant of the header."""
-    taken = {"SIGNALS", "GROUPS", "FAULTS", "SAMPLE_TIME_US", "HASH", "SIGNAL_NAMES", "GROUP_NAMES", "FAULT_NAMES"}
+    taken = {"SIGNALS", "GROUPS", "FAULTS", "SAMPLE_TIME_US", "HASH", "SIGNAL_NAMES", "GROUP_NAMES", "FAULT_NAMES", "UNITS"}
     taken |= {f"GROUP_{n.upper()}" for n in names.groups} | {f"FAULT_{n.upper()}" for n in names.faults}
     for n in names.signals:
         if n.upper() in taken:
@@ -294,7 +294,7 @@ def _distinct(model: str, names: Names) -> None:
 
 def _scale(s: SignalTable) -> list[str]:
     return [
-        f"    {{.resolution = {real(s.resolution)}, .offset = {real(s.offset)}, .per_unit = {real(s.per_unit)},",
+        *entries(f"    {{.resolution = {real(s.resolution)}, .offset = {real(s.offset)}, .per_unit = {real(s.per_unit)},", 5),
         f"     .exponent = {scaled(s.exponent)}, .minimum = {s.minimum}, .maximum = {s.maximum}}}, /* {s.name} */",
     ]
 
