@@ -17,6 +17,7 @@ from hullguard.codegen import emit_c, emit_dbc, write_all
 from hullguard.codegen.c import fill, real
 from hullguard.codegen.dbc import short
 from hullguard.codegen.names import LIBRARY
+from hullguard.codegen.uio import emit_uio
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design, design
 from hullguard.design.protection import MODES, PROFILES
@@ -47,7 +48,7 @@ WARNINGS += ["-ffp-contract=off", "-Werror"]
 COMPILERS = [c for c in ("gcc", "clang-19") if shutil.which(c)]
 REALS = ("f32", "f64")
 SEED = 20
-UNITS = {"m": "m", "mps": "m/s", "mps2": "m/s^2", "pct": "%"}
+UNITS = {"m": "m", "mps": "m/s", "mps2": "m/s^2", "n": "N", "pct": "%"}
 
 # A closing group without signals, a frame of CAN FD with float32 and offset signals and three levels, an extended identifier, two generators.
 TANK = """
@@ -449,10 +450,11 @@ def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
     made["everything"] = design(load_model("platoon_bank", EVERYTHING))[0]
     made["network"] = design(load_model(str(ROOT / "tests" / "fixtures" / "network" / "network.toml")))[0]
     made["published"] = design(load_model("platoon", {"detector.threshold": "zonotope_published"}))[0]
+    made["unknown"] = design(load_model("suspension"))[0]
     return made
 
 
-NAMES = ("platoon", "tank", "places", "bank", "uncertain", "everything", "published", "network")
+NAMES = ("platoon", "tank", "places", "bank", "uncertain", "everything", "published", "network", "unknown")
 FIELDS = {"crc": "E2E_CRC", "counter": "E2E_counter", "nibble": "E2E_data_id", "stamp": "E2E_stamp"}
 
 
@@ -539,6 +541,9 @@ def test_shipped_files_are_those_of_the_shipped_models(name: str) -> None:
     assert (MODELS / f"{name}.h").read_text(encoding="ascii") == header
     assert (MODELS / f"{name}.c").read_text(encoding="ascii") == source
     assert (MODELS / f"{name}.dbc").read_text(encoding="ascii") == emit_dbc(made)
+    for suffix, text in zip((".h", ".c"), emit_uio(made) if made.uios else (), strict=False):
+        assert (MODELS / f"{name}_uio{suffix}").read_text(encoding="ascii") == text
+        assert max(map(len, text.splitlines())) <= 140 and not re.search(r"[ \t]$", text, re.MULTILINE) and made.model.sha256 in text
 
 
 def test_a_model_called_like_a_header_of_the_library_is_refused(designs: dict[str, Design]) -> None:
