@@ -505,11 +505,10 @@ def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
     made["everything"] = design(load_model("platoon_bank", EVERYTHING))[0]
     made["network"] = design(load_model(str(ROOT / "tests" / "fixtures" / "network" / "network.toml")))[0]
     made["published"] = design(load_model("platoon", {"detector.threshold": "zonotope_published"}))[0]
-    made["unknown"] = design(load_model("suspension"))[0]
     return made
 
 
-NAMES = ("platoon", "tank", "places", "bank", "drag", "uncertain", "everything", "published", "network", "suspension", "unknown")
+NAMES = ("platoon", "tank", "places", "bank", "drag", "uncertain", "everything", "published", "network", "suspension")
 FIXED = ("platoon", "places", "bank", "drag")  # those that fixed point can hold
 NUMBERS = [(name, real) for name in NAMES for real in REALS if real != "q31" or name in FIXED]
 FIELDS = {"crc": "E2E_CRC", "counter": "E2E_counter", "nibble": "E2E_data_id", "stamp": "E2E_stamp"}
