@@ -34,12 +34,18 @@ CC_gcc     = $(CC) $(OPTIMISE)
 CC_asan    = $(CC) $(SANITIZE),address
 CC_clang   = $(CLANG) $(OPTIMISE)
 
+# Unit tests that are for one build alone: fixed point, and a library without what a model may do without.
+UNIT_BUILDS     := q31 bare
+UNIT_TESTS_q31  := test_q31
+UNIT_TESTS_bare := test_bare
+REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH)
+
 LIB_SRC     := $(wildcard firmware/src/*.c)
 MODEL_SRC   := $(wildcard firmware/models/*.c)
 CORE_SRC    := $(wildcard host_tools/hullguard/core/*.c)
 HOST_HAL    := loopback socketcan
 HOST_HAL_SRC := $(foreach h,$(HOST_HAL),$(wildcard hal/$(h)/*.c))
-UNIT_TESTS  := $(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c))
+UNIT_TESTS  := $(filter-out $(UNIT_TESTS_q31) $(UNIT_TESTS_bare),$(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c)))
 UNIT_DATA   := $(wildcard tests/fixtures/*)
 RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig_*.c))
 
@@ -106,28 +112,34 @@ $(foreach r,$(REALS),$(eval $(call shared_lib,$(r))))
 $(eval $(call objects,$(BUILD)/static-f32,$(LIB_SRC),$$(CC) $$(OPTIMISE) $(REAL_FLAG_f32)))
 $(eval $(call archive,$(STATIC_LIB),$(BUILD)/static-f32,$(LIB_SRC)))
 
-# --- unit tests: tests/unit/test_X.c, one program each, with every tool set and number type -------------------------------------------
+# --- unit tests: tests/unit/test_X.c, one program each, with every tool set and number type; a few in a build of their own -------------
 
 .PHONY: unit
-unit: ## unit tests (CMocka) with gcc, gcc + ASan + UBSan, clang; f32 and f64
+unit: ## unit tests (CMocka) with gcc, gcc + ASan + UBSan, clang; f32 and f64, some for Q31 or without optional parts
 TEST_PARTS += unit
 
 # A test whose program has not changed since it passed is not run again; its output is beside it, in .log.
 run_test = timeout --foreground -k 5 300 $(1) >$(2).log 2>&1 && touch $(2).ok && echo "  ok  $(2)" \
            || { cat $(2).log; echo "FAILED $(2)"; exit 1; }
 
+# The tables of the models are floats; models that need an optional part do not compile without it.
+$(foreach r,$(FLOATS),$(eval UNIT_MODELS_$(r) := $(MODEL_SRC)))
+UNIT_MODELS_bare := $(filter-out $(patsubst %.h,%.c,$(shell grep -l '^.if !HG_WITH_' firmware/models/*.h)),$(MODEL_SRC))
+unit_tests = $(or $(UNIT_TESTS_$(1)),$(UNIT_TESTS))
+unit_src   = $(LIB_SRC) $(UNIT_MODELS_$(1)) $(HOST_HAL_SRC)
+
 define unit_variant
-$(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(LIB_SRC) $(MODEL_SRC) $(HOST_HAL_SRC),$$(CC_$(1)) $(REAL_FLAG_$(2))))
-$(eval $(call archive,$(BUILD)/unit/$(1)-$(2)/libhullguard.a,$(BUILD)/unit/$(1)-$(2),$(LIB_SRC) $(MODEL_SRC) $(HOST_HAL_SRC)))
-$(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(UNIT_TESTS:%=tests/unit/%.c),$$(CC_$(1)) $(REAL_FLAG_$(2))))
-$(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%): %: $(BUILD)/unit/$(1)-$(2)/libhullguard.a
-$(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%): $(BUILD)/unit/$(1)-$(2)/%: $(BUILD)/unit/$(1)-$(2)/tests/unit/%.o
+$(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(call unit_src,$(2)),$$(CC_$(1)) $(REAL_FLAG_$(2))))
+$(eval $(call archive,$(BUILD)/unit/$(1)-$(2)/libhullguard.a,$(BUILD)/unit/$(1)-$(2),$(call unit_src,$(2))))
+$(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(patsubst %,tests/unit/%.c,$(call unit_tests,$(2))),$$(CC_$(1)) $(REAL_FLAG_$(2))))
+$(patsubst %,$(BUILD)/unit/$(1)-$(2)/%,$(call unit_tests,$(2))): %: $(BUILD)/unit/$(1)-$(2)/libhullguard.a
+$(patsubst %,$(BUILD)/unit/$(1)-$(2)/%,$(call unit_tests,$(2))): $(BUILD)/unit/$(1)-$(2)/%: $(BUILD)/unit/$(1)-$(2)/tests/unit/%.o
 	$$(Q)$$(CC_$(1)) -o $$@ $$< $(BUILD)/unit/$(1)-$(2)/libhullguard.a -lcmocka -lm
-$(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%.ok): %.ok: % $(UNIT_DATA)
+$(patsubst %,$(BUILD)/unit/$(1)-$(2)/%.ok,$(call unit_tests,$(2))): %.ok: % $(UNIT_DATA)
 	@$$(call run_test,$$<,$$*)
-unit: $(UNIT_TESTS:%=$(BUILD)/unit/$(1)-$(2)/%.ok)
+unit: $(patsubst %,$(BUILD)/unit/$(1)-$(2)/%.ok,$(call unit_tests,$(2)))
 endef
-$(foreach t,$(TOOLSETS),$(foreach r,$(FLOATS),$(eval $(call unit_variant,$(t),$(r)))))
+$(foreach t,$(TOOLSETS),$(foreach r,$(FLOATS) $(UNIT_BUILDS),$(eval $(call unit_variant,$(t),$(r)))))
 
 # --- with-vcan: a CAN bus on machines whose kernel has none ----------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ demo: ## set up, then run the platoon with a controller fault on the best bus at
 .PHONY: models
 models: lib ## generate firmware/models/ from host_tools/models/ again
 	@for m in $(SHIPPED); do $(HULLGUARD) design $$m --quiet --out $(BUILD)/models/$$m || exit 1; \
-	  cp $(BUILD)/models/$$m/$$m.h $(BUILD)/models/$$m/$$m.c $(BUILD)/models/$$m/$$m.dbc $(BUILD)/models/$$m/$${m}_config.h firmware/models/; echo "  ok  $$m"; done
+	  cp $(BUILD)/models/$$m/$$m*.h $(BUILD)/models/$$m/$$m*.c $(BUILD)/models/$$m/$$m.dbc firmware/models/; echo "  ok  $$m"; done
 
 .PHONY: openacc
 openacc: ## the openacc model on a recorded drive: make openacc DATA=FILE.csv

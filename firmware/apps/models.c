@@ -3,11 +3,13 @@
 #include "openacc.h"
 #include "platoon.h"
 #include "platoon_bank.h"
+#include "suspension.h"
+#include "suspension_published.h"
 
 #include <string.h>
 
 /* One line a model: its name as its generated header writes it, in lower and in upper case. */
-#define MODELS(X) X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC)
+#define MODELS(X) X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC) X(suspension, SUSPENSION) X(suspension_published, SUSPENSION_PUBLISHED)
 
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_node name##_node;                                        \

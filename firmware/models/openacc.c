@@ -11,7 +11,8 @@
 
 /* car1_scale [2]: codes on the wire, value = offset + resolution code, signal units */
 static const hg_code_scale car1_scale[] = {
-    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784),
+     .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -23000, .maximum = 23000}, /* speed1_mps */
     {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x0p+0, 0), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-14), .minimum = -6000, .maximum = 6000}, /* accel1_mps2 */
@@ -97,9 +98,11 @@ static const hg_real car1_middle[] = {
 
 /* car2_scale [3]: codes on the wire, value = offset + resolution code, signal units */
 static const hg_code_scale car2_scale[] = {
-    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784),
+     .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -23000, .maximum = 23000}, /* speed2_mps */
-    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8,
+     1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -22750, .maximum = 22750}, /* gap2_m */
     {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x0p+0, 0), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-14), .minimum = -6000, .maximum = 6000}, /* accel2_mps2 */
@@ -186,9 +189,11 @@ static const hg_real car2_middle[] = {
 
 /* car3_scale [3]: codes on the wire, value = offset + resolution code, signal units */
 static const hg_code_scale car3_scale[] = {
-    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784),
+     .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -23000, .maximum = 23000}, /* speed3_mps */
-    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8,
+     1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -22750, .maximum = 22750}, /* gap3_m */
     {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x0p+0, 0), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-14), .minimum = -6000, .maximum = 6000}, /* accel3_mps2 */
@@ -275,9 +280,11 @@ static const hg_real car3_middle[] = {
 
 /* car4_scale [3]: codes on the wire, value = offset + resolution code, signal units */
 static const hg_code_scale car4_scale[] = {
-    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784),
+     .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -23000, .maximum = 23000}, /* speed4_mps */
-    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8,
+     1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -22750, .maximum = 22750}, /* gap4_m */
     {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x0p+0, 0), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-14), .minimum = -6000, .maximum = 6000}, /* accel4_mps2 */
@@ -364,9 +371,11 @@ static const hg_real car4_middle[] = {
 
 /* car5_scale [3]: codes on the wire, value = offset + resolution code, signal units */
 static const hg_code_scale car5_scale[] = {
-    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x1.600002p+4, 369098784),
+     .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -23000, .maximum = 23000}, /* speed5_mps */
-    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8, 1048575950),
+    {.resolution = HG_REAL_T(0x1.0624dep-9, 1099511680), .offset = HG_REAL_T(0x1.640002p+5, 373293088), .per_unit = HG_REAL_T(0x1.f3fffep+8,
+     1048575950),
      .exponent = HG_EXPONENT(-16), .minimum = -22750, .maximum = 22750}, /* gap5_m */
     {.resolution = HG_REAL_T(0x1.0624dep-10, 1099511680), .offset = HG_REAL_T(0x0p+0, 0), .per_unit = HG_REAL_T(0x1.f3fffep+9, 1048575950),
      .exponent = HG_EXPONENT(-14), .minimum = -6000, .maximum = 6000}, /* accel5_mps2 */

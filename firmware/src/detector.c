@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+/* deviation: misra-c2012-10.8: HG_REAL_C, as in real.h */
+/* cppcheck-suppress-macro misra-c2012-10.8 */
 #define WIDER HG_REAL_C(1.000001) /* more than the rounding of a difference can take away */
 
 /* Parts that an image does without are constants here, so that the compiler drops them and the linker what they call. */
@@ -20,16 +22,14 @@ static bool with_mismatch(const hg_detector_config *config)
     return (HG_WITH_MISMATCH != 0) && (config->mismatch != NULL);
 }
 
-static bool by_zonotope(const hg_detector_config *config)
-{
-    return (HG_WITH_ZONOTOPE != 0) && (config->zonotope != NULL);
-}
+/* A macro, so that it is a constant for a compiler that does not optimise too: without the part there is nothing to link with. */
+#define BY_ZONOTOPE(config) ((HG_WITH_ZONOTOPE != 0) && ((config)->zonotope != NULL))
 
 /* Has this image all that a configuration asks for? */
 static bool parts_there(const hg_detector_config *config)
 {
     return (predictors_of(config) == config->predictors) && (banks_of(config) == config->banks) &&
-           (with_mismatch(config) == (config->mismatch != NULL)) && (by_zonotope(config) == (config->zonotope != NULL));
+           (with_mismatch(config) == (config->mismatch != NULL)) && (BY_ZONOTOPE(config) == (config->zonotope != NULL));
 }
 
 uint32_t hg_detector_reals(const hg_detector_config *config)
@@ -40,9 +40,9 @@ uint32_t hg_detector_reals(const hg_detector_config *config)
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
     }
     for (uint8_t g = 0U; (config->hull != NULL) && (g < config->generators); g++) {
-        reals += HG_HULL_REALS(config->hull[g].residuals);
+        reals += HG_HULL_REALS(config->hull[g].residuals, config->hull[g].modes);
     }
-    for (uint8_t g = 0U; by_zonotope(config) && (g < config->generators); g++) {
+    for (uint8_t g = 0U; BY_ZONOTOPE(config) && (g < config->generators); g++) {
         const hg_zonotope_config *zonotope = &config->zonotope[g];
         reals += HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances);
     }
@@ -183,13 +183,13 @@ static hg_status start_generators(hg_detector *self, hg_start how)
     for (uint8_t g = 0U; (status == HG_OK) && (g < config->generators); g++) {
         status = hg_residual_start(&self->memory.residual[g], &config->residual[g], memory);
         memory = &memory[HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width)];
-        if ((status == HG_OK) && (config->hull != NULL)) {
-            status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how, memory);
-            memory = &memory[HG_HULL_REALS(config->hull[g].residuals)];
-        } else if ((status == HG_OK) && by_zonotope(config)) {
+        if ((status == HG_OK) && BY_ZONOTOPE(config)) {
             const hg_zonotope_config *zonotope = &config->zonotope[g];
             status = hg_zonotope_start(&self->memory.zonotope[g], zonotope, &self->radii, how, memory);
             memory = &memory[HG_ZONOTOPE_REALS(zonotope->order, zonotope->columns, (uint32_t)zonotope->width + zonotope->disturbances)];
+        } else if (status == HG_OK) {
+            status = hg_hull_start(&self->memory.hull[g], &config->hull[g], &self->radii, how, memory);
+            memory = &memory[HG_HULL_REALS(config->hull[g].residuals, config->hull[g].modes)];
         } else {
             /* refused */
         }
@@ -229,6 +229,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     self->config = config;
     self->memory = *memory;
     self->refusals = 0U;
+    self->beginnings = 1U;
     self->value = memory->real;
     self->r = &self->value[config->width];
     self->J = &self->r[config->residuals];
@@ -248,7 +249,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
 
 static void reset_threshold(hg_detector *self, uint8_t g, hg_start how)
 {
-    if (!by_zonotope(self->config)) {
+    if (!BY_ZONOTOPE(self->config)) {
         hg_hull_reset(&self->memory.hull[g], how);
     } else {
         hg_zonotope_reset(&self->memory.zonotope[g], how);
@@ -264,6 +265,7 @@ static void reset_banks(hg_detector *self)
 
 void hg_detector_restart(hg_detector *self, hg_start how)
 {
+    self->beginnings++;
     hg_ring_reset(&self->radii);
     for (uint8_t i = 0U; i < self->config->predictors; i++) {
         hg_predict_reset(&self->memory.predict[i]);
@@ -350,7 +352,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
     hg_real *row = hg_ring_row(&self->radii, lag);
     hg_real *increase = self->past;
     uint8_t place = config->signals;
-    const bool followed = with_mismatch(config) || by_zonotope(config); /* a hull asks for no more than the new radii */
+    const bool followed = with_mismatch(config) || BY_ZONOTOPE(config); /* a hull asks for no more than the new radii */
     for (uint8_t g = 0U; followed && (g < config->width); g++) {
         increase[g] = row[g];
     }
@@ -372,7 +374,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
             increase[g] = difference(row[g], increase[g]);
         }
     }
-    for (uint8_t g = 0U; by_zonotope(config) && (g < config->generators); g++) {
+    for (uint8_t g = 0U; BY_ZONOTOPE(config) && (g < config->generators); g++) {
         hg_zonotope_widen(&self->memory.zonotope[g], lag, 0U, config->width, increase);
     }
 }
@@ -409,7 +411,7 @@ static void refuse(hg_detector *self)
 /* Threshold of one generator; has it settled since its start? */
 static bool step_threshold(hg_detector *self, uint8_t g, hg_real *J)
 {
-    if (!by_zonotope(self->config)) {
+    if (!BY_ZONOTOPE(self->config)) {
         hg_hull_step(&self->memory.hull[g], &self->radii, J);
         return hg_hull_ready(&self->memory.hull[g]);
     }

@@ -9,10 +9,20 @@ static bool tables_there(const hg_hull_config *config)
            (config->decay != NULL);
 }
 
+static bool modes_valid(const hg_hull_config *config)
+{
+    bool valid = (config->modes == 0U) || ((config->mode_decay != NULL) && (config->mode_input != NULL) && (config->mode_output != NULL) &&
+                                           (config->mode_rest != NULL) && (config->mode_moving != NULL));
+    for (uint8_t m = 0U; valid && (m < config->modes); m++) {
+        valid = (config->mode_decay[m] >= HG_REAL_ZERO) && (config->mode_decay[m] < HG_REAL_C(1.0));
+    }
+    return valid;
+}
+
 bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length)
 {
     bool valid = (config->residuals >= 1U) && (config->width >= 1U) && (config->settle >= 1U) && (config->settle < UINT16_MAX) &&
-                 hg_exponent_valid(config->exponent) && tables_there(config);
+                 hg_exponent_valid(config->exponent) && tables_there(config) && modes_valid(config);
     for (uint8_t g = 0U; valid && (g < config->width); g++) {
         valid = (config->signal[g] < ring_width) && (config->taps[g] < ring_length);
     }
@@ -32,6 +42,7 @@ hg_status hg_hull_start(hg_hull *self, const hg_hull_config *config, const hg_ri
     }
     self->config = config;
     self->theta = memory;
+    self->mode = &memory[config->residuals];
     hg_hull_reset(self, how);
     return HG_OK;
 }
@@ -40,6 +51,9 @@ void hg_hull_reset(hg_hull *self, hg_start how)
 {
     for (uint8_t i = 0U; i < self->config->residuals; i++) {
         self->theta[i] = HG_REAL_ZERO;
+    }
+    for (uint8_t m = 0U; m < self->config->modes; m++) {
+        self->mode[m] = ((how == HG_START_REST) ? self->config->mode_rest : self->config->mode_moving)[m];
     }
     self->k = 0U;
     self->how = how;
@@ -114,14 +128,34 @@ static inline const hg_real *add_signals(hg_pair *sum, hg_pair *tail, const hg_r
     return next;
 }
 
-/* The bound on all lags behind the taps moves on by one sample. Returns J. */
+/* The same of the modes. */
+static void move_modes(hg_hull *self, const hg_ring *ring)
+{
+    const hg_hull_config *config = self->config;
+    const hg_real *input = config->mode_input;
+    for (uint8_t m = 0U; m < config->modes; m++) {
+        hg_acc sum = hg_acc_zero();
+        for (uint8_t g = 0U; g < config->width; g++) {
+            sum = hg_acc_mac(sum, *input, hg_ring_row(ring, config->taps[g])[config->signal[g]]);
+            input = &input[1];
+        }
+        const hg_real kept = hg_real_mul(config->mode_decay[m], self->mode[m]);
+        self->mode[m] = hg_real_min(hg_real_add(kept, hg_acc_real(sum, config->exponent)), HG_REAL_MAX);
+    }
+}
+
+/* The bound on all lags behind the taps moves on by one sample. Returns J, to which the modes are added. */
 static hg_real finish(hg_hull *self, uint8_t i, hg_acc sum, hg_acc leaving, hg_real bias)
 {
-    const int8_t exponent = self->config->exponent;
-    const hg_real kept = hg_real_mul(self->config->decay[i], self->theta[i]);
+    const hg_hull_config *config = self->config;
+    const hg_real kept = hg_real_mul(config->decay[i], self->theta[i]);
     /* Held finite: an infinite theta would never heal. */
-    self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(leaving, exponent)), HG_REAL_MAX);
-    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(sum, exponent)), self->theta[i]), HG_REAL_MAX);
+    self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(leaving, config->exponent)), HG_REAL_MAX);
+    hg_acc all = sum;
+    for (uint8_t m = 0U; m < config->modes; m++) {
+        all = hg_acc_mac(all, config->mode_output[((uint16_t)i * config->modes) + m], self->mode[m]);
+    }
+    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(all, config->exponent)), self->theta[i]), HG_REAL_MAX);
 }
 
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
@@ -129,6 +163,7 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
     const hg_hull_config *config = self->config;
     const hg_real *weight = config->weight;
     const hg_real *bias = bias_step(self);
+    move_modes(self, ring);
     for (uint16_t i = 0U; i < config->residuals; i += 2U) {
         const bool two = (i + 1U) < config->residuals;
         hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};

@@ -12,9 +12,12 @@ typedef struct {
 static inline const hg_real *add_rows(hg_pair *sum, const hg_real *first, const hg_real *x, uint8_t cols)
 {
     const hg_real *upper = first;
-    const hg_real *lower = &first[cols];
+    const hg_real *const end = &first[cols];
+    const hg_real *lower = end;
     const hg_real *value = x;
-    for (uint8_t left = cols; left > 0U; left--) {
+    /* deviation: misra-c2012-14.1: what is counted is pointers, whatever they point at */
+    /* cppcheck-suppress misra-c2012-14.1 */
+    while (upper != end) {
         sum->first = hg_acc_mac(sum->first, *upper, *value);
         sum->second = hg_acc_mac(sum->second, *lower, *value);
         upper++;

@@ -29,15 +29,17 @@ from hullguard.campaign.result import campaign_result, describe, write_results
 from hullguard.campaign.table import check_table, table, write_table
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native, Plant, Recording, Verdict
-from hullguard.design import store
+from hullguard.design import store, uio_sensors
 from hullguard.design.design import Design, design, finish, stored_for
 from hullguard.design.isolation import Pair, isolability
 from hullguard.errors import BusError, ExpectationError, InputError
 from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_override
-from hullguard.model.schema import FAULTS_MAX
+from hullguard.model.schema import FAULTS_MAX, Scenario
 from hullguard.plant.detect import Detector, from_bus, from_log
+from hullguard.plant.estimates import estimate_facts, estimated, write_estimates
 from hullguard.plant.recording import read_recording
 from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, candidate_names, spoken, summary, write_files
+from hullguard.plant.unknown import Continuous
 
 INSIDE = "HULLGUARD_INSIDE"  # set for the copy of a command that runs where with-vcan made a bus
 NODE_START_S = 20.0
@@ -107,10 +109,19 @@ def emit(args: argparse.Namespace, result: dict[str, Any]) -> None:
 # ---- design ----
 
 
+def fixed_point(made: Design) -> dict[str, Any]:
+    """Units of signals and residuals (numbers are times 2^unit) and what rounding adds to a threshold, or why there is none."""
+    fixed = made.tables.fixed
+    if fixed is None:
+        return {"refused": made.tables.not_fixed}
+    names = [s.name for g in fixed.groups for s in g.signals]
+    return {"units": dict(zip(names, fixed.units, strict=False)), "residual_units": list(fixed.units[fixed.width :]), "rounding": list(made.fixed_rounding)}
+
+
 def matrices(made: Design) -> list[dict[str, Any]]:
     """Matrices of every generator by the names of the method note."""
     rows = []
-    for g, found in zip(made.generators, made.stored.observers, strict=True):
+    for i, g in enumerate(made.generators):
         named = {
             "A": g.plant.A, "B": g.plant.B, "C": g.plant.C, "D": g.plant.D, "Ed": g.plant.Ed, "Fd": g.plant.Fd,
             "T": g.observer.T, "G": g.observer.G, "H": g.observer.H, "L": g.observer.L, "W": g.observer.W, "V": g.observer.V, "Qu": g.observer.Qu,
@@ -124,7 +135,7 @@ def matrices(made: Design) -> list[dict[str, Any]]:
         row["smallest_fault_first_draw"] = _by_fault(made, g.spec.faults, g.first)
         row["delay"] = {"size": g.spec.search.size, "samples": _by_fault(made, g.spec.faults, g.delay)}
         row["smallest_fault_without_trigger_aware_filter"] = _by_fault(made, g.spec.faults, g.blind)
-        row["event_weight"] = found.weight
+        row["event_weight"] = made.stored.observers[i].weight if i < len(made.stored.observers) else None
         row["regularised"] = g.filter.regularised
         row["rounding"] = g.tables.rounding.tolist()
         row["threshold_steady"] = g.tables.steady.tolist()
@@ -177,16 +188,20 @@ def run_design(args: argparse.Namespace) -> int:
     for i, g in enumerate(made.generators):
         found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
         say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
+    for i, u in enumerate(made.uios):
+        radii = ", ".join(f"{name} {r:.3g}" for name, r in zip(u.names, u.tables.steady, strict=True))
+        say(args, f"  unknown-input observer {i + 1}: radii {radii}")
     for f in bank_facts(made):
         found = ", ".join(f"{made.model.faults[i].name} {v:.3g}" for i, v in zip(f.faults, f.smallest[:, 0], strict=True))
         say(args, f"  {f.name}: {f.table.certificates} certificates over {f.table.window} samples, smallest fault within {f.within[0]} samples: {found}")
+    say(args, "  fixed point: " + (made.tables.not_fixed or f"rounding is at most {100 * max(made.rounding_shares('q31'), default=0.0):.2g} % of a threshold"))
     say(args, f"model {model.name}, hash {made.tables.hash:08x}: tables, DBC and report in {out}" + ("" if own else f"; search kept in {beside.name}" if not overrides else ""))
     emit(args, {
         "model": model.name, "model_hash": f"{made.tables.hash:08x}", "out": str(out), "generators": matrices(made),
         "slews": {s.name: stored.slew[i].tolist() for i, s in enumerate(model.signals)},
         "state_range": stored.state_range.tolist(),
         "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "passed": c.passed} for c in made.checks],
-        "load_bound": made.load_bound, "reused": own, **as_json(made, pairs),
+        "load_bound": made.load_bound, "reused": own, "fixed_point": fixed_point(made), **as_json(made, pairs), **uio_sensors.as_json(model),
     })  # fmt: skip
     return 0
 
@@ -206,6 +221,13 @@ def the_faults(args: argparse.Namespace, model: Model, scenario: Sequence[FaultS
     return faults
 
 
+def emulated(native: Native, made: Design, scenario: Scenario, faults: Sequence[FaultSpec], samples: int, seed: int) -> Source:
+    """The emulated plant of a scenario."""
+    if made.model.uios:
+        return Continuous(made, native, scenario, faults, samples, seed)
+    return Plant(native, made, scenario.reference, faults, seed)
+
+
 def run_run(args: argparse.Namespace) -> int:
     """`hullguard run`."""
     model, made = prepared(args)
@@ -213,7 +235,7 @@ def run_run(args: argparse.Namespace) -> int:
     samples = args.samples or scenario.samples
     faults = the_faults(args, model, scenario.faults, samples)
     native = Native(library(args.real), made.tables)
-    source = Plant(native, made, scenario.reference, faults, args.seed)
+    source = emulated(native, made, scenario, faults, samples, args.seed)
     return _drive(args, made, native, source, samples, faults, scenario.name, REST, {"figures": scenario.figures} if scenario.figures else {})
 
 
@@ -257,8 +279,12 @@ def _drive(
                 log.close()
     facts = {"bus": name, "seed": args.seed, "scenario": scenario} | (more or {})
     result = summary(made, native, trace, faults, facts)
+    found = estimated(made, native.library, trace, start, source.emulated if isinstance(source, Continuous) else None)
+    result |= estimate_facts(found) if found else {}
     if out is not None:
         write_files(out, made, native, trace, faults, result)
+        if found:
+            write_estimates(out, made, found)
         from hullguard.codegen.dbc import emit_dbc
 
         (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
@@ -407,8 +433,16 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
         else:
             sure = "confirmed at once" if f["confirmed_at"] == f["detected_at"] else f"confirmed at {f['confirmed_at']}" if f["confirmed_at"] is not None else "not confirmed"
             say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}" + _narrowed(f))
+    for v in result.get("isolation", []):
+        say(args, _isolated(v))
     alarms = result["false_alarms"]
     say(args, f"false alarms before the fault: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J {result['margin_max']:.3f}")
+
+
+def _isolated(v: dict[str, Any]) -> str:
+    """What isolation says of a force that should not be there."""
+    share = ", ".join(f"{name} {100 * s:.3g} %" for name, s in v["share"].items() if name in v["candidates"])
+    return f"observer {v['observer']}: the cause is {v['cause']}" + (f", may be {', '.join(v['candidates'])}" if v["candidates"] else "") + (f"; missing: {share}" if share else "")
 
 
 def _narrowed(f: dict[str, Any]) -> str:
@@ -442,7 +476,7 @@ def run_plant(args: argparse.Namespace) -> int:
     samples = args.samples or scenario.samples
     faults = the_faults(args, model, scenario.faults, samples)
     native = Native(library(args.real), made.tables)
-    source = Plant(native, made, scenario.reference, faults, args.seed)
+    source = emulated(native, made, scenario, faults, samples, args.seed)
     options = bus_options(args) or {"interface": "socketcan", "channel": choose.existing_vcan() or "vcan0"}
     pace = Pace(args.lockstep, make_speed(args.speed))
     with opened(**options) as link:

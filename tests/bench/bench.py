@@ -30,7 +30,7 @@ VEHICLES = (2, 3, 5, 8, 12, 20)
 def detector(made: Design) -> str:
     """What runs on each sample, in words."""
     orders = [g.spec.order for g in made.generators]
-    words = [f"{len(orders)} observer{'s' * (len(orders) > 1)} of order {'/'.join(str(o) for o in sorted(set(orders)))}", f"{max(g.taps for g in made.tables.generators)} taps"]
+    words = [f"{len(orders)} observer{'s' * (len(orders) > 1)} of order {'/'.join(str(o) for o in sorted(set(orders)))}", f"{max(max(g.taps) for g in made.tables.generators)} taps"]
     if made.tables.banks:
         words.append(f"{len(made.tables.banks)} banks of {sum(b.certificates for b in made.tables.banks)} certificates")
     return ", ".join(words)

@@ -16,7 +16,6 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -50,7 +49,7 @@ class Tally:
 
 @cache
 def _ready(name: str) -> tuple[Design, dict[str, Native], Array]:
-    made = design(load_model(name, None, "manoeuvres"))[0]
+    made = design(load_model(name))[0]
     lost32 = np.concatenate([g.tables.rounding for g in made.generators] + [np.zeros(len(made.tables.banks))])
     # The banks' rounding in float32 is a share of the bias; a thousandth of it is far more.
     for i, bank in enumerate(made.tables.banks):
@@ -107,16 +106,6 @@ def many(name: str, seed: int, first: int, count: int) -> Tally:
     return tally
 
 
-def shares(name: str) -> list[tuple[float, float]]:
-    """Of each residual of a generator: what rounding is of its usual threshold, in float32 and in fixed point."""
-    made = _ready(name)[0]
-    rows: list[tuple[float, float]] = []
-    for g in made.generators:
-        for i in range(len(g.tables.steady)):
-            rows.append((float(g.tables.rounding[i] / g.tables.steady[i]), made.fixed_rounding[len(rows)] / float(g.tables.steady[i])))
-    return rows
-
-
 def main() -> int:
     """Report, and the exit status."""
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
@@ -128,9 +117,8 @@ def main() -> int:
             step = max(runs // 100, 1)
             jobs = [pool.submit(many, name, seed, first, min(step, runs - first)) for first in range(0, runs, step)]
             total = sum((j.result() for j in jobs), Tally(0, 0, 0, 0, (), 0.0))
-        worst: Any = max(shares(name))
-        print(f"{name}: {total.runs} runs, {total.samples} samples, {len(TYPES)} number types; rounding at most {100 * worst[0]:.3f} % of a threshold in float32, "
-              f"{100 * max(q for _, q in shares(name)):.4f} % in fixed point")
+        f32, q31 = (100 * max(_ready(name)[0].rounding_shares(real)) for real in ("f32", "q31"))
+        print(f"{name}: {total.runs} runs, {total.samples} samples, {len(TYPES)} number types; rounding at most {f32:.3f} % of a threshold in float32, {q31:.4f} % in fixed point")
         print(f"  samples with false alarms {total.false_alarms}; alarms that differ {total.differing}, unexplained {len(total.unexplained)}; "
               f"the closest used {100 * total.closest:.0f} % of what rounding explains")
         for line in total.unexplained[:20]:

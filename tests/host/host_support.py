@@ -23,7 +23,8 @@ from hullguard.model import load_model, parse_fault
 from hullguard.model.schema import Reference
 
 SEED = int(os.environ.get("HULLGUARD_SEED") or int.from_bytes(os.urandom(4), "little"))
-REALS = ("f32", "f64")
+FLOATS = ("f32", "f64")
+REALS = (*FLOATS, "q31")
 SILENT_1 = {"groups.measurement.trigger.silence": 1}
 SILENT_2 = {"groups.measurement.trigger.silence": 2}
 PERIODIC = {"groups.measurement.trigger.interval_max": 1}
@@ -115,8 +116,11 @@ INCLUDE = ("-I", str(ROOT / "firmware" / "include"))
 FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fPIC")
 
 
-def build_library(folder: Path, real: str, patch: dict[str, list[tuple[str, str]]] | None = None, extra: dict[str, str] | None = None) -> Library:
-    """A library from a copy of the sources. `patch`: file name -> (text that must be there exactly once, what replaces it); `extra`: more files."""
+def build_library(
+    folder: Path, real: str, patch: dict[str, list[tuple[str, str]]] | None = None, extra: dict[str, str] | None = None, options: tuple[str, ...] = ()
+) -> Library:
+    """A library from a copy of the sources. `patch`: file name -> (text that must be there exactly once, what replaces it); `extra`: more files;
+    `options`: of the compiler."""
     source = folder / "src"
     source.mkdir(parents=True)
     for origin in (ROOT / "firmware" / "src", ROOT / "host_tools" / "hullguard" / "core"):
@@ -133,7 +137,7 @@ def build_library(folder: Path, real: str, patch: dict[str, list[tuple[str, str]
     defined = f"-DHG_REAL_{real.upper()}=1"
     shared = folder / f"libhullguard_{real}.so"
     files = [str(f) for f in sorted(source.glob("*.c"))]
-    subprocess.run(["gcc", *FLAGS, defined, *INCLUDE, "-I", str(source), "-shared", "-Wl,--no-undefined", "-o", str(shared), *files, "-lm"], check=True)
+    subprocess.run(["gcc", *FLAGS, *options, defined, *INCLUDE, "-I", str(source), "-shared", "-Wl,--no-undefined", "-o", str(shared), *files, "-lm"], check=True)
     declare = ROOT / "host_tools" / "hullguard" / "core" / "declare"
     done = subprocess.run(["gcc", "-E", "-P", "-nostdinc", defined, "-I", str(declare), *INCLUDE, str(source / "host.h")], check=True, capture_output=True, text=True)
     (folder / f"hullguard_{real}.i").write_text(done.stdout, encoding="utf-8")

@@ -40,7 +40,7 @@ class Case:
 
     @property
     def ours(self) -> Protector:
-        return Protector(library(REALS[len(self.data) % 2]), self.table)
+        return Protector(library(REALS[len(self.data) % len(REALS)]), self.table)
 
     @property
     def sent(self) -> bytes:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from cantools.database.can import Database, Message, Signal
 from cantools.database.conversion import BaseConversion
-from host_support import REALS, ROOT, SEED, Cli, Ready, alarms, build_library
+from host_support import FLOATS, ROOT, SEED, Cli, Ready, alarms, build_library
 from hullguard.bus import candump
 from hullguard.codegen import emit_c
 from hullguard.codegen.dbc import emit_dbc, messages_of
@@ -324,7 +324,7 @@ def test_a_models_own_database_gives_its_own_frames_back(tmp_path: Path) -> None
 # ---- runs ----
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("scenario", ["rest", "manoeuvres"])
 def test_no_false_alarm_on_a_vehicles_network_and_faults_are_found(network: Design, scenario: str, real: str) -> None:
     batch = ready(network, scenario, real).batch
@@ -342,7 +342,7 @@ def test_a_healthy_network_is_told_as_healthy(network: Design) -> None:
     assert np.all(error <= trace["radius"][:, :6] * (1 + 1e-6))
 
 
-@pytest.fixture(scope="module", params=REALS)
+@pytest.fixture(scope="module", params=FLOATS)
 def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, network: Design) -> tuple[Ready, Generated]:
     header, source = emit_c(network)
     lib = build_library(tmp_path_factory.mktemp("network") / "lib", request.param, extra={"network.h": header, "network.c": source})

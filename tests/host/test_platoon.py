@@ -101,7 +101,7 @@ def test_a_fault_is_still_found_and_confirmed_while_every_tenth_frame_is_lost(mo
     assert len(delays(rows, "confirmed_at")) == len(rows)
 
 
-def test_f32_and_f64_see_the_same_events_and_raise_the_same_alarms(models: Models, real: str) -> None:
+def test_all_number_types_see_the_same_events_and_raise_the_same_alarms(models: Models, real: str) -> None:
     """A verdict may differ between builds only where | |r| - J | <= eps_r: rare enough to show in none of these runs' delays by more than a sample."""
     other = "f64" if real == "f32" else "f32"
     rows = found(models.platoon("manoeuvres", None, real), 2, 1.0)

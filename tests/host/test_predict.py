@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host_support import REALS, SEED, SILENT_2, Alarms, Models, alarms, build_library
+from host_support import FLOATS, SEED, SILENT_2, Alarms, Models, alarms, build_library
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, Batch, Native
 from hullguard.design.design import Design, design
@@ -28,7 +28,7 @@ def twins_hold(trace: dict[str, Any], places: list[int], first: int) -> None:
     assert np.all(trace["radius"][:, twin] <= trace["radius"][:, own])
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("silence", [0, 2])
 @pytest.mark.parametrize("loss", [0.0, 0.2])
 def test_predictions_are_true_and_tighter(models: Models, real: str, silence: int, loss: float) -> None:
@@ -42,7 +42,7 @@ def test_predictions_are_true_and_tighter(models: Models, real: str, silence: in
     assert tighter > 500
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("overrides", [{}, SILENT_2], ids=["no silent time", "two silent samples"])
 def test_no_false_alarm_with_prediction(models: Models, real: str, overrides: dict[str, Any]) -> None:
     ready = models.platoon("manoeuvres", PREDICTED | overrides, real)

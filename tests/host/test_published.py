@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host_support import REALS, Alarms, Cli, Models, alarms
+from host_support import FLOATS, Alarms, Cli, Models, alarms
 from hullguard.core.library import library
 from hullguard.core.pair import Pair
 from hullguard.design.zonotope_table import TRUNCATE
@@ -138,7 +138,7 @@ def test_a_run_that_lost_its_residuals_before_the_filter_is_refused(folder: Path
 # ---- observer and post-filter as two systems ----
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("scenario", ["published", "rest"])
 def test_two_systems_in_series_give_the_fused_residual(models: Models, real: str, scenario: str) -> None:
     ready = models.platoon(scenario, None, real)

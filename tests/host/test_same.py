@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host_support import REALS, SEED, SILENT_1, Cli, Models, Ready, build_library
+from host_support import FLOATS, REALS, SEED, SILENT_1, Cli, Models, Ready, build_library
 from hullguard.codegen import emit_c
 from hullguard.core.library import Library, library
 from hullguard.core.native import (
@@ -72,15 +72,29 @@ def test_batches_and_traces_of_one_run_agree(models: Models, real: str) -> None:
 
 # ---- generated tables ----
 
-UNCERTAIN = {"plant.drag_per_s": {"value": 1.0, "pm": 0.1}, "detector.prediction": True}
+DRAG = {"plant.drag_per_s": {"value": 1.0, "pm": 0.1}}
+UNCERTAIN = DRAG | {"detector.prediction": True}
 VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     "plain": ("platoon", {}),
     "bank": ("platoon_bank", {}),
+    "drag": ("platoon_bank", DRAG),
     "uncertain": ("platoon", UNCERTAIN),
     "zonotope": ("platoon", UNCERTAIN | {"detector.threshold": "zonotope"}),
     "published": ("platoon", {"detector.threshold": "zonotope_published"}),
     "everything": ("platoon_bank", UNCERTAIN | {"detector.threshold": "zonotope"}),
 }
+FIXED = ("plain", "bank", "drag")  # those that fixed point can hold
+
+
+def variants(real: str) -> tuple[str, ...]:
+    """Those that a number type can hold."""
+    return FIXED if real == "q31" else tuple(VARIANTS)
+
+
+def compiled(*names: str) -> pytest.MarkDecorator:
+    """These variants, in each number type that can hold them."""
+    pairs = [(real, name) for real in REALS for name in names if name in variants(real)]
+    return pytest.mark.parametrize(("generated", "name"), pairs, indirect=["generated"], scope="module")
 
 
 class Generated(Native):
@@ -93,12 +107,12 @@ class Generated(Native):
         self.node, self.senders = lib.ffi.addressof(lib.lib, f"hg_{made.tables.name}_config"), getattr(lib.lib, f"hg_{made.tables.name}_sender")
 
 
-@pytest.fixture(scope="module", params=REALS)
+@pytest.fixture(scope="module")
 def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, models: Models) -> dict[str, tuple[Ready, Generated]]:
     """Every variant's generated C compiled into one library, each under a name of its own, beside the structures that Python fills."""
     designs: dict[str, Design] = {}
     extra: dict[str, str] = {}
-    for name, (model, overrides) in VARIANTS.items():
+    for name, (model, overrides) in ((name, VARIANTS[name]) for name in variants(request.param)):
         made = models.design(overrides, "manoeuvres", model)
         designs[name] = replace(made, tables=replace(made.tables, name=f"model_{name}"))
         extra[f"model_{name}.h"], extra[f"model_{name}.c"] = emit_c(designs[name])
@@ -109,14 +123,14 @@ def generated(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
 
 @pytest.mark.parametrize("lockstep", [True, False])
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-@pytest.mark.parametrize("name", ["plain", "everything"])
+@compiled("plain", "drag", "everything")
 def test_generated_tables_give_the_same_frames_as_structures_filled_at_run_time(generated: dict[str, tuple[Ready, Generated]], name: str, lockstep: bool, loss: float) -> None:
-    ready, compiled = generated[name]
+    ready, tables = generated[name]
     rng = np.random.default_rng(SEED)
     for start in (REST, 0):
         source = Plant(ready.native, ready.design, ready.reference, [parse_fault(f) for f in FAULTS], SEED)
-        nodes = (Node(ready.native, start), Node(compiled, start))
-        senders = (Sender(ready.native), Sender(compiled))
+        nodes = (Node(ready.native, start), Node(tables, start))
+        senders = (Sender(ready.native), Sender(tables))
         answers = 0
         for k in range(200):
             reading = source.read()
@@ -153,13 +167,13 @@ def assert_same(one: Batch, other: Batch, runs: int) -> None:
             assert traces[0][part].tobytes() == traces[1][part].tobytes(), f"run {run}: {part}"
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@compiled(*VARIANTS)
 @pytest.mark.parametrize(("loss", "burst", "start"), [(0.0, 0, REST), (0.1, 3, REST), (0.3, 5, MOVING)])
 def test_runs_with_generated_tables_differ_in_no_bit(generated: dict[str, tuple[Ready, Generated]], name: str, loss: float, burst: int, start: int) -> None:
-    ready, compiled = generated[name]
+    ready, own = generated[name]
     faults = [parse_fault(f) for f in FAULTS]
     options: dict[str, Any] = {"loss": loss, "burst": burst, "start": start}
-    filled, tables = (Batch(n, ready.design, 160, ready.reference, faults, SEED, **options) for n in (ready.native, compiled))
+    filled, tables = (Batch(n, ready.design, 160, ready.reference, faults, SEED, **options) for n in (ready.native, own))
     rows = filled.runs(0, 5)
     # Under bursts of losses a few runs may well end without an alarm; without losses the faults are always found.
     assert sum(r["lost"] for r in rows) > 0 if loss > 0.0 else any(r["plant"] > 1 or r["provisional_at"] >= 0 for r in rows)
@@ -183,9 +197,10 @@ def nudged(tables: Tables) -> list[Tables]:
     ]
 
 
+@pytest.mark.parametrize("generated", FLOATS, indirect=True, scope="module")
 def test_one_number_of_any_part_makes_a_difference(generated: dict[str, tuple[Ready, Generated]]) -> None:
-    ready, compiled = generated["everything"]
-    batch = Batch(compiled, ready.design, 160, ready.reference, (), SEED)
+    ready, own = generated["everything"]
+    batch = Batch(own, ready.design, 160, ready.reference, (), SEED)
     for i, tables in enumerate(nudged(ready.design.tables)):
         other = Batch(Native(ready.native.library, tables), ready.design, 160, ready.reference, (), SEED)
         with pytest.raises(AssertionError):

@@ -100,9 +100,9 @@ def test_a_truncated_zonotope_is_not_sound(models: Models) -> None:
 
 # ---- what each part adds to the threshold is needed ----
 
-NO_MISMATCH = {"mismatch.c": [("out[i] = hg_real_min(config->constant[i] + hg_acc_real(sum, 0), HG_REAL_MAX);", "out[i] = hg_real_mul(hg_acc_real(sum, 0), HG_REAL_ZERO);")]}
+NO_MISMATCH = {"mismatch.c": [("out[i] = hg_real_min(hg_real_add(config->constant[i], hg_acc_real(sum, config->exponent)), HG_REAL_MAX);", "out[i] = hg_real_mul(hg_acc_real(sum, 0), HG_REAL_ZERO);")]}
 MUTANTS: dict[str, tuple[Variant, dict[str, list[tuple[str, str]]]]] = {
-    "a bank takes radii as smaller": (VARIANTS["bank"], {"bank.c": [("hg_real_mul(config->widen, radius", "hg_real_mul(HG_REAL_C(0.9), radius")]}),
+    "a bank takes radii as smaller": (VARIANTS["bank"], {"bank.c": [("hg_real_widen(radius[config->signal[g]], config->widen)", "hg_real_widen(radius[config->signal[g]], HG_REAL_C(0.9))")]}),
     "an uncertain plant counts as certain": (Variant("platoon", drag(0.3), 0.0, PLANTS), NO_MISMATCH),
     "and beside a bank": (VARIANTS["together"], NO_MISMATCH),
     "a prediction does not wait": (Variant("platoon", PREDICTION | SILENT_2, 0.0), {"predict.c": [("self->sure = self->k >= config->settle;", "self->sure = true;")]}),
@@ -129,7 +129,7 @@ def test_without_its_share_there_are_false_alarms(models: Models, monkeypatch: p
 
 
 # Radii of uncertain states do not grow with those that turn out wider behind a gap.
-NO_GROWTH = {"mismatch.c": [("out[i] = hg_real_min(out[i] + hg_acc_real(sum, 0), HG_REAL_MAX);", "out[i] = hg_real_min(out[i], hg_acc_real(sum, 0) + HG_REAL_MAX);")]}
+NO_GROWTH = {"mismatch.c": [("out[i] = hg_real_min(hg_real_add(out[i], hg_acc_real(sum, config->exponent)), HG_REAL_MAX);", "out[i] = hg_real_min(out[i], hg_acc_real(sum, 0) + HG_REAL_MAX);")]}
 
 
 def test_thresholds_behind_a_gap_count_what_uncertain_states_did_meanwhile(models: Models, tmp_path: Path) -> None:

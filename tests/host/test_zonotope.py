@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
-from host_support import REALS, SEED, Models
+from host_support import FLOATS, SEED, Models
 from hullguard.core.library import Library, library
 from hullguard.core.zonotope import fill
 from hullguard.design import hull, zonotope
@@ -21,6 +21,7 @@ from hullguard.design.observer import SubPlant
 from hullguard.design.zonotope_table import BALL, BOX, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from linear_support import KINDS, pair, random_state
 
 SOUND = (BOX, BALL)
 RUNS = 30
@@ -68,32 +69,6 @@ def exact(lin: hull.Linear, radius: Array, bias: Array) -> Array:
     return bias[np.minimum(np.arange(len(radius)), len(bias) - 1)] * (1 - 8 * U32) + np.array(sums)
 
 
-def pair(size: float, angle: float) -> Array:
-    return size * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-def companion(gamma: Array) -> Array:
-    G = np.eye(len(gamma), k=-1)
-    G[:, -1] = gamma
-    return G
-
-
-def random_state(rng: np.random.Generator, kind: str) -> Array:
-    """A stable state matrix: separate poles, deadbeat, multiple poles, or a companion."""
-    if kind == "deadbeat":
-        return companion(np.zeros(int(rng.integers(1, 7))))
-    if kind == "multiple":
-        s = int(rng.integers(2, 5))
-        return companion(-np.poly(np.full(s, rng.uniform(0.0, 0.6)))[::-1][:s])
-    blocks: list[Array] = [np.array([[rng.uniform(-0.95, 0.95)]]) for _ in range(int(rng.integers(0, 4)))]
-    blocks += [pair(rng.uniform(0.0, 0.95), rng.uniform(0.1, 3.0)) for _ in range(int(rng.integers(0 if blocks else 1, 3)))]
-    modal = scipy.linalg.block_diag(*blocks)
-    if kind == "companion":
-        return companion(-np.poly(np.linalg.eigvals(modal)).real[::-1][: len(modal)])
-    X = rng.standard_normal(modal.shape)
-    return np.asarray(X @ modal @ np.linalg.inv(X))
-
-
 def random_linear(rng: np.random.Generator, kind: str) -> tuple[hull.Linear, Array]:
     """A generator in units of every size, and its usual radii."""
     state = random_state(rng, kind)
@@ -117,7 +92,8 @@ def table_of(lin: hull.Linear, radius: Array, columns: int, reduction: int, bias
     sub = SubPlant(np.eye(s), np.zeros((s, 0)), np.zeros((width, s)), np.zeros((width, 0)), np.zeros((s, 1)), np.zeros((width, 1)), radius, np.zeros(0))
     one, none = up32(np.full((1, residuals), bias)), np.zeros(residuals)
     steady = exact(lin, np.tile(radius, (100, 1)), one)[-1]
-    tables = hull.HullTables(np.zeros((1, residuals, width)), one, one, 0, 0, 0.0, np.zeros(width), none, none, steady)
+    nothing = np.zeros((residuals, width))
+    tables = hull.HullTables(nothing[None], (1,) * width, one, one, 1, none, none, one[0], 0, 0, none, nothing, none, steady)
     ranges = hull.Ranges(np.zeros(s), np.zeros(s), np.zeros(width), np.zeros(0), np.zeros(0))
     return zonotope.build(lin, np.eye(s), sub, ranges, radius, tables, tuple(range(width)), columns, reduction, "random")
 
@@ -129,7 +105,7 @@ def linears() -> list[tuple[hull.Linear, Array, np.random.Generator]]:
     refused = 0
     for i in range(40):
         rng = np.random.default_rng([SEED, i])
-        lin, radius = random_linear(rng, ("modal", "deadbeat", "multiple", "companion")[i % 4])
+        lin, radius = random_linear(rng, KINDS[i % 4])
         try:
             table_of(lin, radius, 250, BALL)
             made.append((lin, radius, rng))
@@ -140,7 +116,7 @@ def linears() -> list[tuple[hull.Linear, Array, np.random.Generator]]:
     return made
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_a_sound_zonotope_is_never_below_the_exact_sum(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     for lin, radius, rng in linears:
@@ -151,7 +127,7 @@ def test_a_sound_zonotope_is_never_below_the_exact_sum(linears: list[tuple[hull.
         assert np.all(found >= least), (lin, columns, (found / least).min())
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_without_reduction_it_is_the_exact_sum(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     over = []
@@ -193,7 +169,7 @@ def test_truncation_falls_below_the_exact_sum(linears: list[tuple[hull.Linear, A
     assert below > len(linears) / 3
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_late_radii_are_as_sound_as_radii_from_the_start(linears: list[tuple[hull.Linear, Array, np.random.Generator]], real: str, reduction: int) -> None:
     for lin, radius, rng in linears:
@@ -307,7 +283,7 @@ def delays(made: Design, traces: list[dict[str, Array]], table: ZonotopeTable, r
     return early, float(np.mean(late)) if late else np.inf, missed
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("start", [0, 1])
 @pytest.mark.parametrize("published", [False, True])
 def test_disturbances_and_the_initial_set_are_never_below_their_exact_sum(models: Models, real: str, start: int, published: bool) -> None:
@@ -337,7 +313,7 @@ def faulty(models: Models) -> dict[float, list[dict[str, Array]]]:
     return made
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 @pytest.mark.parametrize("reduction", SOUND)
 def test_twelve_columns_find_faults_of_the_platoon_as_early_as_the_exact_hull(models: Models, faulty: dict[float, Any], real: str, reduction: int) -> None:
     made = models.design()
@@ -349,7 +325,7 @@ def test_twelve_columns_find_faults_of_the_platoon_as_early_as_the_exact_hull(mo
         assert np.mean(hulls) <= late + 1e-9 <= np.mean(hulls) + limit
 
 
-@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("real", FLOATS)
 def test_boxes_with_disturbances_as_columns_are_as_late_as_published_ones(models: Models, faulty: dict[float, Any], real: str) -> None:
     """Section 6: 17.1 / 14.4 and 8.7 / 7.5 for q = 12 / 48 with columns ordered by Euclid's norm; by what a box loses it is earlier."""
     made = models.design()

@@ -353,6 +353,73 @@ std::uint32_t Decision::candidates() const
     return common;
 }
 
+/* ---- An unknown-input observer ---- */
+
+namespace {
+
+/* [e^(A t), integral of e^(A s) M] from e^([A M; 0 0] t), by halving until the series is short. */
+Matrix exponential(const Matrix &m)
+{
+    int    halvings = 0;
+    double norm     = m.cwiseAbs().rowwise().sum().maxCoeff();
+    for (; norm > 0.25; norm *= 0.5) { ++halvings; }
+    const Matrix small = m * std::pow(0.5, halvings);
+    Matrix       sum = Matrix::Identity(m.rows(), m.cols()), term = sum;
+    for (int i = 1; i < 20; ++i) {
+        term = term * small / i;
+        sum += term;
+    }
+    for (; halvings > 0; --halvings) { sum = sum * sum; }
+    return sum;
+}
+
+} // namespace
+
+UnknownInputObserver::UnknownInputObserver(const UnknownInputPlant &p, const Matrix &K1, double t, const Vector &low) : low_(low)
+{
+    const Eigen::Index n = p.A.rows(), m = p.C.rows(), inputs = p.B.cols(), q = p.G.cols();
+    const Matrix       CG = p.C * p.G;
+    H = p.G * (CG.transpose() * CG).inverse() * CG.transpose();
+    const Matrix T = Matrix::Identity(n, n) - H * p.C;
+    F = T * p.A - K1 * p.C;
+    K = K1 + F * H;
+    Matrix hold = Matrix::Zero(n + 2 * m, n + 2 * m); /* z' = F z + K y, y' a constant */
+    hold.topLeftCorner(n, n) = F;
+    hold.block(0, n, n, m) = K;
+    hold.block(n, n + m, m, m) = Matrix::Identity(m, m) / t;
+    hold = exponential(hold * t);
+    Fd  = hold.topLeftCorner(n, n);
+    K1d = hold.block(0, n + m, n, m);
+    K0  = hold.block(0, n, n, m) - K1d;
+    Matrix known = Matrix::Zero(n + inputs, n + inputs);
+    known.topLeftCorner(n, n) = F;
+    known.topRightCorner(n, inputs) = T * p.B;
+    Bz = exponential(known * t).topRightCorner(n, inputs);
+    Matrix drive = Matrix::Zero(n + inputs + q, n + inputs + q);
+    drive.topLeftCorner(n, n) = p.A;
+    drive.block(0, n, n, inputs) = p.B;
+    drive.block(0, n + inputs, n, q) = p.G;
+    drive = exponential(drive * t);
+    Ad = drive.topLeftCorner(n, n);
+    Bd = drive.block(0, n, n, inputs);
+    Gd = drive.block(0, n + inputs, n, q);
+    inverse = (Gd.transpose() * Gd).inverse() * Gd.transpose();
+    z_ = xhat_ = Vector::Zero(n);
+    y_ = Vector::Zero(m);
+    u_ = Vector::Zero(inputs);
+    f_ = Vector::Zero(q);
+}
+
+void UnknownInputObserver::step(const Vector &y, const Vector &u)
+{
+    z_ = Fd * z_ + K0 * y_ + K1d * y + Bz * u_;
+    const Vector x = z_ + H * y;
+    f_ += low_.cwiseProduct(inverse * (x - Ad * xhat_ - Bd * u_) - f_);
+    xhat_ = x;
+    y_ = y;
+    u_ = u;
+}
+
 /* ---- Banks ---- */
 
 void Bank::step(const Vector &value, const Vector &radius)

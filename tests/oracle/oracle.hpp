@@ -173,6 +173,28 @@ private:
     std::vector<Matrix> y_, u_, d_, x_; /* [lag] */
 };
 
+/* ---- An unknown-input observer (suspension, sections 1.1 and 1.4; uio.h) ---- */
+
+/** x' = A x + B u + G f, y = C x, rank CG = columns of G. */
+struct UnknownInputPlant {
+    Matrix A, B, G, C;
+};
+
+/** The observer as it is derived, with y linear between samples, u and f constant, and f reconstructed from two estimates of the state. */
+class UnknownInputObserver {
+public:
+    /** K1 makes F stable; low: of each entry of f, 0 < low <= 1. */
+    UnknownInputObserver(const UnknownInputPlant &plant, const Matrix &K1, double sample_time, const Vector &low);
+    void          step(const Vector &y, const Vector &u); /* everything before the first sample is 0 */
+    const Vector &state() const { return xhat_; }
+    const Vector &input() const { return f_; }
+
+    Matrix H, F, K, Fd, K0, K1d, Bz, Ad, Bd, Gd, inverse; /* Bz: what u does to z in a sample; inverse: Gd^+ */
+
+private:
+    Vector low_, z_, y_, u_, xhat_, f_;
+};
+
 /* ---- Banks of certificates (platoon, section 7; bank.h) ---- */
 
 /** A parity vector over the last samples, the newest first, and over whole rows: 0 where a signal is not read. */

@@ -3,7 +3,7 @@
  *  that closes samples, outages. A hash is printed over every verdict, every report and the bits of every value, radius, r and J. float32
  *  arithmetic is exact to the bit by IEEE 754 wherever no product is fused into a sum and no subnormal number is flushed to zero, and fixed point
  *  is integers, so that every processor must print the same. To have subnormal numbers, and in fixed point such as do not fit, the residual
- *  generators run once more on signals of such a size. No C library is needed. */
+ *  generators run once more on signals of such a size. Then the fusion filter (corpus_fusion.c). No C library is needed. */
 
 #include "console.h"
 #include "openacc.h"
@@ -11,6 +11,10 @@
 #include "platoon_bank.h"
 
 #include <string.h>
+
+#if !HG_REAL_Q31
+#include "corpus_fusion.h" /* in float only */
+#endif
 
 #define SAMPLES 4096UL
 #define PART 1024UL   /* samples between two lines: they tell where two processors part */
@@ -321,6 +325,12 @@ int main(void)
     for (size_t i = 0U; i < (sizeof(subjects) / sizeof(subjects[0])); i++) {
         good = run(&subjects[i]) && good;
     }
+#if !HG_REAL_Q31
+    const uint64_t fusion = corpus_fusion(SAMPLES);
+    good = good && (fusion != 0U);
+    print_hex("fusion ", fusion, 16U);
+    print("\n");
+#endif
     print(good ? "corpus ends\n" : "corpus fails\n");
     return good ? 0 : 1;
 }

@@ -13,7 +13,7 @@ UNIT_TARGETS := $(foreach t,$(RUN_TARGETS),$(if $(filter-out none,$(LIBC_$(t))),
 
 # Unit tests that need more than the 16 KB of RAM of the microbit: what was compiled for Cortex-M0 runs on the board of Cortex-M3, whose
 # instructions contain M0's. No test is left out on any target.
-UNIT_LARGE_cortex_m0 := test_adversary test_bank test_hold test_linalg test_mismatch test_node test_ring test_robust test_zonotope
+UNIT_LARGE_cortex_m0 := test_adversary test_bank test_fusion test_hold test_linalg test_mismatch test_node test_ring test_robust test_zonotope
 UNIT_BOARD_cortex_m0 := cortex_m3
 
 # These take 7 to 60 s on each target. `make test` runs the others, on the smallest core, on one with an FPU and on the big-endian one, beside
@@ -23,7 +23,9 @@ CORPUS_QUICK := $(filter-out $(patsubst %,%-q31,cortex_m3 cortex_m33 cortex_m7 c
 UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TESTS)/$(t)/%.ok,$(filter-out $(UNIT_SLOW),$(UNIT_TESTS))))
 
 # What a program is made of beside its test: by the C library of its target.
-CORPUS_SRC        := tests/target/corpus.c $(MODEL_SRC)
+CORPUS_SRC        := tests/target/corpus.c $(patsubst %,firmware/models/%.c,platoon platoon_bank openacc)
+CORPUS_SRC_f32    := $(CORPUS_SRC) tests/target/corpus_fusion.c
+CORPUS_SRC_q31    := $(CORPUS_SRC)
 NODE_SRC          := firmware/apps/detector_main.c tests/target/board_script.c firmware/models/platoon.c
 CONSOLE_none      := tests/target/console_semihosting.c hal/semihosting/semihosting.c
 CONSOLE_newlib    := $(CONSOLE_none)
@@ -58,8 +60,8 @@ $(FIRMWARE)/%/image.ok: $(FIRMWARE)/%/detector.elf $(FIRMWARE)/%/libhullguard.a 
 
 # $(call host_corpus,REAL,LIBRARY)
 define host_corpus
-$(eval $(call objects,$(TARGET_TESTS)/host-$(1),$(CORPUS_SRC) $(CONSOLE_glibc),$$(CC) $$(OPTIMISE) $(REAL_FLAG_$(1)) -Itests/target))
-$(TARGET_TESTS)/host-$(1)/corpus: $(call target_objects,host-$(1),$(CORPUS_SRC) $(CONSOLE_glibc)) $(2)
+$(eval $(call objects,$(TARGET_TESTS)/host-$(1),$(CORPUS_SRC_$(1)) $(CONSOLE_glibc),$$(CC) $$(OPTIMISE) $(REAL_FLAG_$(1)) -Itests/target))
+$(TARGET_TESTS)/host-$(1)/corpus: $(call target_objects,host-$(1),$(CORPUS_SRC_$(1)) $(CONSOLE_glibc)) $(2)
 	$$(Q)$$(CC) -o $$@ $$^
 $(TARGET_TESTS)/host-$(1)/corpus.log: $(TARGET_TESTS)/host-$(1)/corpus
 	$$(Q)$$< >$$@
@@ -69,9 +71,9 @@ $(eval $(call host_corpus,q31,$(LIB_SRC:%.c=$(BUILD)/shared-q31/%.o)))
 
 # $(call target_tests,BUILD,LIBC,TARGET,REAL)
 define target_tests
-$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC) $(NODE_SRC)) $(CONSOLE_$(2)) $(if $(filter $(1),$(UNIT_TARGETS)),$(CMOCKA_$(2)) $(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
+$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC_$(4)) $(NODE_SRC)) $(CONSOLE_$(2)) $(if $(filter $(1),$(UNIT_TARGETS)),$(CMOCKA_$(2)) $(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
 $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/$(1)/node: hal/start/image.ld
-$(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC) $(CONSOLE_$(2))) $(call target_start,$(1),$(3)) $(FIRMWARE)/$(1)/libhullguard.a
+$(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC_$(4)) $(CONSOLE_$(2))) $(call target_start,$(1),$(3)) $(FIRMWARE)/$(1)/libhullguard.a
 	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$(filter %.o %.a,$$^) -lgcc
 $(TARGET_TESTS)/$(1)/corpus.ok: $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/host-$(4)/corpus.log
 	@$$(call target_run,$(3),$$<) >$$<.log 2>$$<.err && diff $(TARGET_TESTS)/host-$(4)/corpus.log $$<.log && touch $$@ && echo "  ok  $$<" || { echo "FAILED $$<, see $$<.log"; exit 1; }

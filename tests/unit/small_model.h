@@ -14,8 +14,8 @@
 #define SM_GENERATORS 2U
 #define SM_TAPS 5U
 #define SM_HISTORY (SM_TAPS + 1U)
-#define SM_CODES (2U * SM_SIGNALS)
-#define SM_REALS ((3U * SM_SIGNALS) + (2U * 2U) + (SM_SIGNALS * SM_HISTORY) + 4U + 3U)
+#define SM_CODES (3U * SM_SIGNALS)
+#define SM_REALS ((2U * SM_SIGNALS) + (2U * 2U) + (SM_SIGNALS * SM_HISTORY) + 4U + 3U + 2U)
 #define SM_RESOLUTION 0.015625
 #define SM_HALF 0.0078125
 #define SM_SPAN 94.0
@@ -33,7 +33,7 @@ static const uint8_t sm_silence_b[] = {0U};
 static const hg_trigger_config sm_trigger_b = {.width = 1U, .levels = 1U, .interval_max = 1U, .silence = sm_silence_b, .delta = sm_delta,
                                                .sigma = sm_zero, .activity = sm_zero, .zero = sm_zero};
 
-static const hg_code_scale sm_scale[] = {{R(SM_RESOLUTION), R(0), R(64), -SM_LIMIT, SM_LIMIT}, {R(SM_RESOLUTION), R(0), R(64),
+static const hg_code_scale sm_scale[] = {{R(SM_RESOLUTION), R(0), R(64), 0, -SM_LIMIT, SM_LIMIT}, {R(SM_RESOLUTION), R(0), R(64), 0,
     -SM_LIMIT, SM_LIMIT}};
 static const hg_real sm_half[] = {R(SM_HALF), R(SM_HALF)};
 static const hg_real sm_span[] = {R(SM_SPAN), R(SM_SPAN)};
@@ -57,16 +57,20 @@ static const hg_residual_config sm_residual[SM_GENERATORS] = {
     {.order = 1U, .residuals = 1U, .width = 1U, .signal = sm_signals_1, .state = {1U, 1U, 0, sm_none}, .input = {1U, 1U, 0, sm_one},
      .output = {1U, 1U, 0, sm_minus_one}, .direct = {1U, 1U, 0, sm_one}}};
 
-static const hg_real sm_weight_0[SM_TAPS * 2U] = {R(1), R(1)};
-static const hg_real sm_weight_1[SM_TAPS] = {R(1), R(1)};
-static const hg_real sm_rest_0[] = {R(0.0625), R(0.0625)};
-static const hg_real sm_moving_0[] = {R(64), R(0.0625)};
-static const hg_real sm_bias_1[] = {R(64), R(0.25)};
+static const uint8_t sm_taps[] = {SM_TAPS, SM_TAPS};
+static const hg_real sm_weight_0[(SM_TAPS + 1U) * 2U] = {[0] = R(1), [SM_TAPS + 1U] = R(1)};
+static const hg_real sm_weight_1[SM_TAPS + 1U] = {R(1), R(1)};
+static const hg_real sm_start_0[] = {R(64)};
+static const hg_real sm_bias_0[] = {R(0.0625)};
+static const hg_real sm_start_1[] = {R(64)};
+static const hg_real sm_bias_1[] = {R(0.25)};
 static const hg_hull_config sm_hull[SM_GENERATORS] = {
-    {.residuals = 1U, .width = 2U, .signal = sm_signals_0, .taps = SM_TAPS, .weight = sm_weight_0, .settle = 2U, .rest = sm_rest_0,
-     .moving = sm_moving_0, .ready_rest = 0U, .ready_moving = 3U, .decay = R(0), .tail_input = sm_none, .tail_output = sm_none},
-    {.residuals = 1U, .width = 1U, .signal = sm_signals_1, .taps = SM_TAPS, .weight = sm_weight_1, .settle = 2U, .rest = sm_bias_1,
-     .moving = sm_bias_1, .ready_rest = 0U, .ready_moving = 2U, .decay = R(0), .tail_input = sm_none, .tail_output = sm_none}};
+    {.residuals = 1U, .width = 2U, .signal = sm_signals_0, .taps = sm_taps, .weight = sm_weight_0, .settle = 1U, .rest = sm_bias_0,
+     .rest_left = sm_none, .moving = sm_start_0, .moving_left = sm_none, .bias = sm_bias_0, .ready_rest = 0U, .ready_moving = 3U,
+     .decay = sm_none},
+    {.residuals = 1U, .width = 1U, .signal = sm_signals_1, .taps = sm_taps, .weight = sm_weight_1, .settle = 1U, .rest = sm_start_1,
+     .rest_left = sm_none, .moving = sm_start_1, .moving_left = sm_none, .bias = sm_bias_1, .ready_rest = 0U, .ready_moving = 2U,
+     .decay = sm_none}};
 
 static const uint8_t sm_feeds[] = {0x3U, 0x1U};
 static const uint32_t sm_faults[] = {0x5U, 0x2U};

@@ -42,10 +42,15 @@ static void give(rig *r, uint8_t group, int32_t a, int32_t b, bool continues)
 static void refuse(const hg_detector_config *config, hg_status expected)
 {
     static sm_storage storage;
+    static hg_real real[SM_REALS + 9U];
     hg_detector self;
-    const hg_detector_memory memory = sm_memory(&storage);
+    hg_detector_memory memory = sm_memory(&storage);
+    arm(real, COUNT(real));
+    memory.real = real; /* enough even for tables that contradict one another */
+    memory.reals = SM_REALS + 8U;
     assert_status(expected, hg_detector_start(&self, config, &memory, HG_START_REST));
     sm_check_canaries(&storage);
+    assert_untouched(&real[SM_REALS + 8U], 1U);
 }
 
 static void null_pointers_are_refused(void **state)
@@ -116,6 +121,10 @@ static void contradicting_tables_are_refused(void **state)
     refuse(&d, HG_E_CONFIG);
 }
 
+/* Of a group that speaks less often than the small model's. */
+static const hg_real long_slew[SM_TAPS + 2U + 3U] = {SM_SLEW(1), SM_SLEW(2), SM_SLEW(3), SM_SLEW(4), SM_SLEW(5), SM_SLEW(6), SM_SLEW(7),
+                                                     SM_SLEW(8), SM_SLEW(9), SM_SLEW(10)};
+
 static void contradicting_groups_are_refused(void **state)
 {
     (void)state;
@@ -132,10 +141,50 @@ static void contradicting_groups_are_refused(void **state)
     hold[1].margin = 255U;
     refuse(&c, HG_E_CONFIG);
     hg_trigger_config slow = sm_trigger_b;
-    slow.interval_max = SM_TAPS + 1U; /* a rewind would reach behind the taps */
+    slow.interval_max = SM_TAPS + 2U; /* a rewind would reach behind the taps */
     hold[1] = sm_hold[1];
     hold[1].trigger = &slow;
+    hold[1].slew = long_slew;
     refuse(&c, HG_E_CONFIG);
+    slow.interval_max = SM_TAPS + 1U;
+    rig r;
+    begin_with(&r, &c, HG_START_REST);
+}
+
+/* A frame can be found lost as long as its group may be silent; a signal without events needs no tap. */
+static void a_rewind_ends_within_a_signals_own_taps(void **state)
+{
+    (void)state;
+    hg_hull_config hull[SM_GENERATORS] = {sm_hull[0], sm_hull[1]};
+    hg_detector_config c = sm_detector;
+    c.hull = hull;
+    const uint8_t enough[] = {3U, 0U};
+    const uint8_t few[] = {2U, 0U};
+    rig r;
+    hull[0].taps = enough;
+    begin_with(&r, &c, HG_START_REST);
+    hull[1].taps = enough;
+    begin_with(&r, &c, HG_START_REST);
+    hull[1].taps = few;
+    refuse(&c, HG_E_CONFIG);
+    hull[0].taps = few;
+    hull[1].taps = enough;
+    refuse(&c, HG_E_CONFIG);
+    hg_trigger_config slow = sm_trigger_b;
+    hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
+    slow.interval_max = 2U;
+    hold[1].trigger = &slow;
+    hold[1].slew = long_slew;
+    c.hold = hold;
+    hull[0].taps = enough; /* a sample may be rewritten, but it would be in the tail */
+    refuse(&c, HG_E_CONFIG);
+    hull[0].taps = NULL;
+    refuse(&c, HG_E_CONFIG);
+    hull[0] = sm_hull[0];
+    hull[0].signal = NULL;
+    refuse(&c, HG_E_CONFIG);
+    hull[0] = sm_hull[0];
+    begin_with(&r, &c, HG_START_REST);
 }
 
 static void contradicting_generators_are_refused(void **state)
@@ -158,7 +207,8 @@ static void contradicting_generators_are_refused(void **state)
     residual[1].state.rows = 2U;
     refuse(&c, HG_E_CONFIG);
     residual[1] = sm_residual[1];
-    hull[0].decay = R(1);
+    const hg_real endless = R(1);
+    hull[0].decay = &endless;
     refuse(&c, HG_E_CONFIG);
     hull[0] = sm_hull[0];
     const hg_detector_config good = c;
@@ -320,10 +370,58 @@ static void restart_forgets_alarms(void **state)
     give(&r, 0U, 1000, 0, true);
     give(&r, 1U, 0, 0, true);
     assert_int_equal(HG_PLANT_CONFIRMED, step(&r));
+    assert_count(1U, r.self.beginnings);
     hg_detector_restart(&r.self, HG_START_REST);
+    assert_count(2U, r.self.beginnings);
     give(&r, 0U, 0, 0, true);
     give(&r, 1U, 0, 0, true);
     assert_int_equal(HG_PLANT_NONE, step(&r));
+}
+
+/* Their thetas take their memory from the detector's, and shift nobody else's. */
+static void a_threshold_with_modes_stands_beside_the_others(void **state)
+{
+    (void)state;
+    const hg_real decay[2] = {R(0.5), R(0.25)};
+    const hg_real in[4] = {R(1), R(1), R(1), R(1)};
+    const hg_real out[2] = {R(1), R(2)};
+    const hg_real begun[2] = {R(8), R(16)};
+    hg_hull_config hull[SM_GENERATORS] = {sm_hull[0], sm_hull[1]};
+    hull[0].modes = 2U;
+    hull[0].mode_decay = decay;
+    hull[0].mode_input = in;
+    hull[0].mode_output = out;
+    hull[0].mode_rest = begun;
+    hull[0].mode_moving = begun;
+    hg_detector_config c = sm_detector;
+    c.hull = hull;
+    assert_count(SM_REALS + 2U, hg_detector_reals(&c));
+    rig r;
+    rig plain;
+    hg_real real[SM_REALS + 3U];
+    arm(real, COUNT(real));
+    begin(&plain, HG_START_REST);
+    hg_detector_memory memory = sm_memory(&r.storage);
+    memory.real = real;
+    memory.reals = SM_REALS + 1U;
+    assert_status(HG_E_SIZE, hg_detector_start(&r.self, &c, &memory, HG_START_REST));
+    memory.reals = SM_REALS + 2U;
+    assert_status(HG_OK, hg_detector_start(&r.self, &c, &memory, HG_START_REST));
+    double mode[2] = {8.0, 16.0};
+    for (int k = 0; k < 10; k++) {
+        give(&r, 0U, 64, 128, true);
+        give(&r, 1U, 62, 0, true);
+        give(&plain, 0U, 64, 128, true);
+        give(&plain, 1U, 62, 0, true);
+        assert_int_equal(step(&plain), step(&r));
+        for (size_t m = 0U; m < 2U; m++) {
+            mode[m] = ((double)decay[m] * mode[m]) + ((k < (int)SM_TAPS) ? 0.0 : (2.0 * SM_HALF));
+        }
+        assert_real((double)plain.self.J[0] + mode[0] + (2.0 * mode[1]), r.self.J[0]);
+        assert_real(plain.self.J[1], r.self.J[1]);
+        assert_memory_equal(plain.self.r, r.self.r, 2U * sizeof(hg_real));
+    }
+    assert_untouched(&real[SM_REALS + 2U], 1U);
 }
 
 /* Only corrupted tables bring a number that is not finite as far as a generator. */
@@ -448,6 +546,7 @@ int main(void)
         cmocka_unit_test(memory_one_too_short_is_refused),
         cmocka_unit_test(contradicting_tables_are_refused),
         cmocka_unit_test(contradicting_groups_are_refused),
+        cmocka_unit_test(a_rewind_ends_within_a_signals_own_taps),
         cmocka_unit_test(contradicting_generators_are_refused),
         cmocka_unit_test(a_sample_computes_by_hand),
         cmocka_unit_test(groups_that_do_not_exist_are_refused),
@@ -456,6 +555,7 @@ int main(void)
         cmocka_unit_test(a_lost_frame_takes_a_provisional_alarm_back),
         cmocka_unit_test(a_moving_start_shows_until_it_has_settled),
         cmocka_unit_test(restart_forgets_alarms),
+        cmocka_unit_test(a_threshold_with_modes_stands_beside_the_others),
         cmocka_unit_test(a_refused_generator_begins_again_and_the_others_go_on),
         cmocka_unit_test(two_detectors_share_tables_and_nothing_else),
         cmocka_unit_test(no_false_alarm_is_confirmed_whatever_is_lost),

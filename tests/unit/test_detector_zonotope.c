@@ -9,20 +9,23 @@
 
 #define COLUMNS 8U
 #define ROOM(width) (HG_ZONOTOPE_REALS(1U, COLUMNS, (width)))
-#define REALS (SM_REALS + ROOM(2U) + ROOM(1U))
+#define REALS (SM_REALS - (2U * HG_HULL_REALS(1U, 0U)) + ROOM(2U) + ROOM(1U))
 
 static const uint8_t one_row[] = {1U};
 static const hg_real zero[] = {R(0), R(0)};
 static const hg_real one[] = {R(1), R(1)};
 static const hg_real minus_one[] = {R(-1)};
+static const hg_real rest_0[] = {R(0.0625), R(0.0625)};
+static const hg_real moving_0[] = {R(64), R(0.0625)};
+static const hg_real bias_1[] = {R(64), R(0.25)};
 static const hg_zonotope_config balls[SM_GENERATORS] = {
     {.order = 1U, .residuals = 1U, .width = 2U, .disturbances = 0U, .initial = 0U, .columns = COLUMNS, .blocks = 1U, .reduction = HG_REDUCTION_BALL,
      .signal = sm_signals_0, .block = one_row, .state = zero, .input = zero, .output = zero, .outer = zero, .direct = one, .settle = 2U,
-     .bias_rest = sm_rest_0, .bias_moving = sm_moving_0, .decay = zero, .always = zero, .growth = zero, .output_growth = zero, .recover = 1U,
+     .bias_rest = rest_0, .bias_moving = moving_0, .decay = zero, .always = zero, .growth = zero, .output_growth = zero, .recover = 1U,
      .ready_rest = 0U, .ready_moving = 3U},
     {.order = 1U, .residuals = 1U, .width = 1U, .disturbances = 0U, .initial = 0U, .columns = COLUMNS, .blocks = 1U, .reduction = HG_REDUCTION_BALL,
      .signal = sm_signals_1, .block = one_row, .state = zero, .input = one, .output = minus_one, .outer = one, .direct = one, .settle = 2U,
-     .bias_rest = sm_bias_1, .bias_moving = sm_bias_1, .decay = zero, .always = zero, .growth = zero, .output_growth = zero, .recover = 1U,
+     .bias_rest = bias_1, .bias_moving = bias_1, .decay = zero, .always = zero, .growth = zero, .output_growth = zero, .recover = 1U,
      .ready_rest = 0U, .ready_moving = 2U}};
 
 static hg_detector_config with_balls(void)

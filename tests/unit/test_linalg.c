@@ -77,8 +77,8 @@ static void fits_notices_each_contradiction(void **state)
 {
     (void)state;
     const hg_real data[6] = {R(0)};
-    const hg_matrix m = {.rows = 2U, .cols = 3U, .exponent = 1, .data = data};
-    const hg_matrix n = {.rows = 2U, .cols = 1U, .exponent = 1, .data = data};
+    const hg_matrix m = {.rows = 2U, .cols = 3U, .exponent = 0, .data = data};
+    const hg_matrix n = {.rows = 2U, .cols = 1U, .exponent = 0, .data = data};
     assert_true(hg_linalg_fits(&m, &n, 2U, 3U, 1U));
     assert_false(hg_linalg_fits(&m, &n, 1U, 3U, 1U));
     assert_false(hg_linalg_fits(&m, &n, 2U, 2U, 1U));
@@ -87,8 +87,11 @@ static void fits_notices_each_contradiction(void **state)
     other.rows = 3U;
     assert_false(hg_linalg_fits(&m, &other, 2U, 3U, 1U));
     other = n;
-    other.exponent = 0;
+    other.exponent = 1;
     assert_false(hg_linalg_fits(&m, &other, 2U, 3U, 1U));
+    hg_matrix scaled = m;
+    scaled.exponent = 1;
+    assert_false(hg_linalg_fits(&scaled, &other, 2U, 3U, 1U)); /* float tables are not scaled */
     other = n;
     other.data = NULL;
     assert_false(hg_linalg_fits(&m, &other, 2U, 3U, 1U));

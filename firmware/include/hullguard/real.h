@@ -34,6 +34,8 @@
 #if HG_REAL_Q31
 typedef int32_t hg_real;
 typedef int64_t hg_acc;
+/* deviation: misra-c2012-10.8: a constant is scaled and cut in one expression, because tables are initialised with it */
+/* cppcheck-suppress-macro misra-c2012-10.8 */
 #define HG_REAL_C(x) (((x) >= 1.0) ? INT32_MAX : (int32_t)((x) * 2147483648.0)) /* 1 and above: infinity */
 #define HG_REAL_MAX (INT32_MAX - 1)
 #elif HG_REAL_F64
@@ -56,7 +58,8 @@ typedef hg_real hg_acc;
 /* x / 2^places, rounded; 0 <= places <= 62, |x| + half of 2^places < 2^63. */
 static inline int64_t hg_q31_shift(int64_t x, uint8_t places)
 {
-    const uint64_t half = (places > 0U) ? ((uint64_t)1U << (places - 1U)) : 0U;
+    const uint64_t one = 1U;
+    const uint64_t half = (one << places) >> 1U;
     const uint64_t magnitude = (((x < 0) ? (uint64_t)(-x) : (uint64_t)x) + half) >> places;
     return (x < 0) ? -(int64_t)magnitude : (int64_t)magnitude;
 }
@@ -126,7 +129,8 @@ static inline hg_real hg_real_of_code(hg_real resolution, int8_t exponent, int32
 /** x per_unit 2^-exponent / 4 to the nearest integer, ties away from zero, per_unit = 1 / (4 resolution); INT32_MIN where there is none. */
 static inline int32_t hg_real_to_code(hg_real x, hg_real per_unit, int8_t exponent)
 {
-    const int64_t nearest = hg_q31_shift((int64_t)x * per_unit, (uint8_t)(60 + exponent));
+    const int32_t places = 60 + (int32_t)exponent;
+    const int64_t nearest = hg_q31_shift((int64_t)x * per_unit, (uint8_t)places);
     const bool known = hg_real_finite(x) && (nearest > -(int64_t)INT32_MAX) && (nearest < (int64_t)INT32_MAX);
     return known ? (int32_t)nearest : INT32_MIN;
 }
@@ -140,7 +144,8 @@ static inline hg_acc hg_acc_mac(hg_acc sum, hg_real a, hg_real x)
 /** The sum as a number, times 2^exponent; rounds, and saturates here. */
 static inline hg_real hg_acc_real(hg_acc sum, int8_t exponent)
 {
-    return hg_q31_saturate(hg_q31_shift(sum, (uint8_t)(31 - exponent)));
+    const int32_t places = 31 - (int32_t)exponent;
+    return hg_q31_saturate(hg_q31_shift(sum, (uint8_t)places));
 }
 
 /** An empty sum. */
@@ -204,7 +209,7 @@ static inline bool hg_exponent_valid(int8_t exponent)
 static inline hg_real hg_real_of_code(hg_real resolution, int8_t exponent, int32_t code)
 {
     (void)exponent;
-    return resolution * (hg_real)code;
+    return hg_real_mul(resolution, (hg_real)code);
 }
 
 /** x per_unit to the nearest integer, ties away from zero; INT32_MIN where there is none. */

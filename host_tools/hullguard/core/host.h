@@ -8,6 +8,10 @@
 
 #include "hullguard/hullguard.h"
 
+#if !HG_REAL_Q31
+#include "fusion_run.h"
+#endif
+
 #define HGH_STATES_MAX 64
 #define HGH_SIGNALS_MAX 96
 #define HGH_DISTURBANCES_MAX 192
@@ -187,6 +191,34 @@ int64_t hgh_batch(const hgh_run_config *config, int64_t first, int64_t count, hg
  *  @param[out] delay   [starts][faults] samples to the first alarm, -1 for none within the horizon */
 int64_t hgh_sweep(const hgh_run_config *config, const hgh_fault *fault, int32_t faults, int64_t start, int64_t step, int64_t starts,
                   int64_t horizon, int32_t *delay);
+
+#if !HG_REAL_Q31
+/* An unknown-input observer with its own ring of radii, and the isolation of one of its estimates, sample after sample. */
+typedef struct {
+    const hg_uio_config     *uio;
+    const hg_isolate_config *isolate; /* or null */
+    int32_t                  width;   /* signals, 1 .. 255 */
+    int32_t                  history; /* rows of the ring, more than the hull's taps, .. 255 */
+    int32_t                  start;   /* hg_start */
+} hgh_uio_config;
+
+typedef struct hgh_uio hgh_uio;
+
+/** Null when the configuration is refused. Freed by hgh_uio_free(). */
+hgh_uio *hgh_uio_new(const hgh_uio_config *config);
+void     hgh_uio_free(hgh_uio *self);
+
+/** Make up to `samples` steps.
+ *  @param[in]  value, radius    [samples][width] signals; radius may be null: 0
+ *  @param[out] estimate, bound  [samples][estimates] estimates and their radii; each may be null
+ *  @param[out] isolation        [samples] what isolation says after each, or null
+ *  Returns the number of samples that were not refused. */
+int64_t hgh_uio_steps(hgh_uio *self, const double *value, const double *radius, int64_t samples, double *estimate, double *bound,
+                      hg_isolation *isolation);
+
+/** [components + 1] offset and shares of the last window that was judged. */
+const hg_real *hgh_uio_share(const hgh_uio *self);
+#endif
 
 /** Bits on the wire with stuff bits and interframe space, exact; nominal and data phase together for FD. */
 uint32_t hgh_frame_bits(const hg_can_frame *frame);

@@ -15,7 +15,7 @@ from hullguard.core.library import Library
 from hullguard.core.protect import protection
 from hullguard.core.zonotope import fill
 from hullguard.design.design import Design
-from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, Tables
+from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, ModalGeneratorTable, Tables
 from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.plant import Plant as PlantModel
@@ -190,6 +190,9 @@ class Native:
         h.settle, h.rest, h.moving = g.settle, self._reals(g.rest), self._reals(g.moving)
         h.rest_left, h.moving_left, h.bias = self._reals(g.rest_left), self._reals(g.moving_left), self._reals(g.bias)
         h.ready_rest, h.ready_moving, h.decay = g.ready_rest, g.ready_moving, self._reals(g.decay)
+        if isinstance(g, ModalGeneratorTable):
+            h.modes, h.mode_decay, h.mode_input, h.mode_output = len(g.mode_decay), self._reals(g.mode_decay), self._reals(g.mode_input), self._reals(g.mode_output)
+            h.mode_rest, h.mode_moving = self._reals(g.mode_rest), self._reals(g.mode_moving)
 
 
 def frame_out(library: Library, frame: Any) -> Frame:
@@ -363,6 +366,8 @@ def fault_array(library: Library, model: Model, faults: Sequence[FaultSpec]) -> 
     """Faults as hgh_fault[]; a fault's name carries its type, a bare signal's is an actuator's where the plant applies what was sent."""
     made = library.ffi.new("hgh_fault[]", max(len(faults), 1))
     for i, f in enumerate(faults):
+        if f.name in model.components:
+            raise InputError(f"fault '{f}': a part of the plant is weakened between samples, which only `run` and `plant` emulate; name an actuator or a sensor here")
         signal = model.signal(f.name)
         named = [x for x in model.faults if x.name == f.name]
         applied = any(g.applied_as_sent and signal in g.signals for g in model.groups)

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from hullguard.bus.bits import load_bound
-from hullguard.design import hull, store, zonotope
+from hullguard.design import hull, store, uio_generator, zonotope
 from hullguard.design.arith import digits, mul, row_sums, up32
 from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
@@ -24,7 +24,21 @@ from hullguard.design.protection import LISTED, NONE
 from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
 from hullguard.design.store import Stored, StoredObserver
-from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, MismatchTable, PredictTable, Tables, group_table, message_table, rows, verdict_table
+from hullguard.design.tables import (
+    GeneratorTable,
+    GroupTable,
+    MessageTable,
+    MismatchTable,
+    ModalGeneratorTable,
+    PredictTable,
+    Tables,
+    group_table,
+    message_table,
+    rows,
+    verdict_table,
+)
+from hullguard.design.uio_generator import UioDesign
+from hullguard.design.uio_hull import ModalTables
 from hullguard.design.window import Varying, varying_states
 from hullguard.design.zonotope_table import BALL, TRUNCATE, ZonotopeTable
 from hullguard.errors import InputError
@@ -46,7 +60,7 @@ class Generator:
     observer: ObserverMatrices
     filter: PostFilter
     linear: hull.Linear
-    given: hull.Given
+    given: hull.Given | None  # none of an unknown-input observer
     tables: hull.HullTables
     zonotope: ZonotopeTable | None  # the threshold instead of the hull
     signal: tuple[int, ...]  # places of its signals
@@ -70,11 +84,18 @@ class Design:
     usual: Array  # radii of the whole vector most of the time
     uncertain: tuple[int, ...]  # states whose mismatch is a derived signal, the last ones of the vector
     fixed_rounding: tuple[float, ...]  # residuals of generators, banks: the part of J that is rounding in fixed point; () where there is none
+    uios: tuple[UioDesign, ...] = ()  # all estimates of the generators that are unknown-input observers
 
     @property
     def varying(self) -> Varying:
         """Disturbances whose bounds are the radii of the uncertain states."""
         return varying_states(self.model.plant, self.uncertain)
+
+    def rounding_shares(self, real: str) -> list[float]:
+        """What rounding is of the usual threshold, a share a residual of the generators."""
+        steady = [float(x) for g in self.generators for x in g.tables.steady]
+        lost = self.fixed_rounding if real == "q31" else [float(x) for g in self.generators for x in g.tables.rounding]
+        return [x / J for x, J in zip(lost, steady, strict=False)]
 
     @property
     def judges(self) -> list[str]:
@@ -177,7 +198,8 @@ def check_observable(model: Model) -> None:
 
 def find(model: Model, tick: Tick) -> Stored:
     """All that needs a search or a solver, rounded for the design file."""
-    check_observable(model)
+    if not model.uios:
+        check_observable(model)
     horizon = max(g.horizon for g in model.groups)
     plant = replace(model.plant, A=digits(model.plant.A), B=digits(model.plant.B), dA=digits(model.plant.dA), dB=digits(model.plant.dB))
     if plant.feedback is not None:
@@ -190,9 +212,10 @@ def find(model: Model, tick: Tick) -> Stored:
     model = _disturbed(model, reached.state, reached.signal)
     radius = usual_radius(model, reached.slew)
     observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
-    spread = (plant.dA, plant.dB) if uncertain(model) else (None, None)
+    dA, dB = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
-    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), observers, *spread)
+    uios = tuple(uio_generator.find(model, i, radius, reached.state) for i in range(len(model.uios)))
+    return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), observers, dA, dB, uios=uios)
 
 
 def _found(model: Model, i: int, radius: Array, tick: Tick) -> StoredObserver:
@@ -273,15 +296,18 @@ def finish(model: Model, stored: Stored) -> Design:
     model = replace(model, plant=plant, observers=specs)
     groups = tuple(group_table(model, g, stored.slew) for g in model.groups)
     derived = _derived(model, stored, groups)
-    generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers)))
+    values = np.array([largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
+    uios = tuple(uio_generator.finish(model, i, u, derived.usual, values, stored.state_range) for i, u in enumerate(stored.uios))
+    generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers))) + tuple(_uio_generator(model, u) for u in uios)
     tables = _tables(model, groups, generators, derived, _banks(model, stored, derived))
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s, model.data_bitrate_bps)
-    checks = [c for i, g in enumerate(generators) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
+    checks = [c for i, u in enumerate(uios) for c in uio_generator.checks(i, u)]
+    checks += [c for i, g in enumerate(generators[: len(model.observers)]) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
     tables, lost = _fixed(model, generators, tables)
-    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states, lost)
+    return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states, lost, uios)
 
 
 def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables) -> tuple[Tables, tuple[float, ...]]:
@@ -384,6 +410,13 @@ def _generator(model: Model, i: int, stored: Stored, derived: Derived) -> Genera
     return Generator(spec, bounded, o, f, linear, given, table, ball, signal, own, found.smallest, found.first, delay, blind)
 
 
+def _uio_generator(model: Model, made: UioDesign) -> Generator:
+    """An unknown-input observer as a generator: its residuals are the estimates of faults."""
+    none, o = np.full(len(made.faults), np.nan), uio_generator.matrices(made)
+    spec, rows, radius = uio_generator.observer_spec(model, made), len(made.faults), np.concatenate([made.sub.Sy, made.sub.Su])
+    return Generator(spec, made.sub, o, no_filter(spec.order, rows), made.rows, None, made.tables.first(rows), None, made.signal, radius, made.smallest, none, none, none)
+
+
 def _zonotope(
     model: Model,
     linear: hull.Linear,
@@ -420,7 +453,7 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
     size = smallest_faults(g.plant, g.observer, g.filter, paths, g.radius[: len(g.signal)]) if paths else np.zeros(0)
     # A prediction is as wrong as the faulty plant, whichever fault it is: every fault may move what reads one.
     predicted = bool(set(g.signal) & set(sent))
-    return GeneratorTable(
+    made = GeneratorTable(
         signal=g.signal,
         wide=wide,
         state=rows(g.linear.state),
@@ -443,6 +476,11 @@ def _generator_table(model: Model, g: Generator, derived: Derived) -> GeneratorT
         faults=sum(1 << i for i, s in enumerate(size) if s < SEEN or predicted) | breaking(model),
         zonotope=g.zonotope,
     )
+    if not isinstance(g.tables, ModalTables):
+        return made
+    t = g.tables
+    decay, rest, moving = (tuple(float(x) for x in v) for v in (t.mode_decay, t.mode_rest, t.mode_moving))
+    return ModalGeneratorTable(**vars(made), mode_decay=decay, mode_input=rows(t.mode_input), mode_output=rows(t.mode_output), mode_rest=rest, mode_moving=moving)
 
 
 def used_banks(model: Model, stored: Stored) -> list[StoredBank]:

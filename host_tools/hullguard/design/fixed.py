@@ -17,7 +17,7 @@ import numpy as np
 from hullguard.design.arith import mul, powers
 from hullguard.design.bank_types import BankTable
 from hullguard.design.hull import Fixed, Given, HullTables, Linear, build
-from hullguard.design.tables import FLOAT32, GeneratorTable, GroupTable, MismatchTable, SignalTable, Tables, rows
+from hullguard.design.tables import FLOAT32, GeneratorTable, GroupTable, MismatchTable, ModalGeneratorTable, SignalTable, Tables, rows
 from hullguard.errors import InputError
 from hullguard.model.table import Array
 
@@ -68,7 +68,7 @@ def _exponent(sums: Array, what: str) -> int:
     return exponent
 
 
-def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], hulls: tuple[HullTables, ...], where: str) -> FixedDesign:
+def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given | None, ...], hulls: tuple[HullTables, ...], where: str) -> FixedDesign:
     """A design's tables in fixed point; refuses what has no range that holds for any data."""
     _refuse(tables, where)
     groups = tuple(_group(g, where) for g in tables.groups)
@@ -86,7 +86,10 @@ def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], 
     rounding: list[float] = []
     generators = []
     for i, g in enumerate(tables.generators):
-        made, unit, lost = _generator(g, linear[i], given[i], hulls[i], _Signals(scale, values, spans), f"{where}: detector.observers[{i}]")
+        own = given[i]
+        if own is None:
+            raise InputError(f"{where}: not for fixed point: detector.observers[{i}] is an unknown-input observer; use float32")
+        made, unit, lost = _generator(g, linear[i], own, hulls[i], _Signals(scale, values, spans), f"{where}: detector.observers[{i}]")
         generators.append(made)
         residual_units += unit
         rounding += lost
@@ -113,6 +116,8 @@ class _Signals:
 
 
 def _refuse(tables: Tables, where: str) -> None:
+    if any(isinstance(g, ModalGeneratorTable) for g in tables.generators):
+        raise InputError(f"{where}: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32")
     if any(g.zonotope is not None for g in tables.generators):
         raise InputError(f"{where}: not for fixed point: the columns of a zonotope have no proven range; set detector.threshold = \"exact\"")
     if tables.predictors:

@@ -94,10 +94,12 @@ class Fixed:
     like: HullTables  # of the same generator in float32: same taps, decays and rows
 
 
-def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int, fixed: Fixed | None = None) -> Rounding:
+def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Array, more: Array, lags: int, fixed: Fixed | None = None, truth: Array | None = None) -> Rounding:
     """One step loses at most gamma (|G||z| + |E||v|), one residual gamma (|F||z| + |D||v|); |z| <= |T||x| + |e|, |v| <= |s| + radius.
 
     In fixed point sums are exact, and each loses half a step of its number in the end.
+
+    `truth` (residuals x n): what the outputs of the generator stand for, in place of 0.
 
     `more` (order x derived): how radii enter e that come with no value; nothing is rounded where they enter, only what they do to e later.
     """
@@ -113,7 +115,8 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     e = np.array([mul(np.abs(mul(p, T)), x) for p in P]).max(0) + np.array([row_sums(np.abs(mul(p, Bd))) for p in P]).sum(0)[:, None]
     z = mul(np.abs(T), x) + e
     into_e = mul(np.abs(mul(T, plant.A) - mul(lin.state, T) - mul(Ly, plant.C)), x) + mul(np.abs(mul(T, plant.B) - mul(Ly, plant.D) - Lu), u)
-    into_r = mul(np.abs(mul(lin.output, T) + mul(Dy, plant.C)), x) + mul(np.abs(mul(Dy, plant.D) + Du), u)
+    meant = truth if truth is not None else np.zeros((lin.output.shape[0], T.shape[1]))
+    into_r = mul(np.abs(mul(lin.output, T) + mul(Dy, plant.C) - meant), x) + mul(np.abs(mul(Dy, plant.D) + Du), u)
     into_e += gamma * (mul(G, z) + mul(E, v))
     into_r += gamma * (mul(F, z) + mul(D, v))
     if fixed:
@@ -127,10 +130,25 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     weight = np.zeros((lags + 1, F.shape[0], width + more.shape[1]))
     weight[0, :, :width] = D
     weight[1:] = np.array([mul(F, w) for w in into_z])
-    for i in range(lags):
-        for r in range(F.shape[0]):
-            weight[1 + i :, r] += (FP[i, r][None, :, None] * per_step[: lags - i]).sum(1)
+    weight[1:] += _through(FP, per_step) if lags > LAGS_MAX else _lag_by_lag(FP, per_step)
     return Rounding(into_e[:, 0], into_r[:, 0], gamma * weight, gamma * mul(weight[-1], widest)[:, 0] * lags)
+
+
+def _lag_by_lag(answer: Array, step: Array) -> Array:
+    """Sum over i of answer(i) step(lag - i): lags x residuals x width."""
+    out = np.zeros((len(step), answer.shape[1], step.shape[2]))
+    for i in range(len(step)):
+        for r in range(answer.shape[1]):
+            out[i:, r] += (answer[i, r][None, :, None] * step[: len(step) - i]).sum(1)
+    return out
+
+
+def _through(answer: Array, step: Array) -> Array:
+    """The same over many lags, by transforms; few digits, rounded up by more than these lose, are the same on every processor."""
+    size = 2 * len(step)
+    both = np.einsum("frs,fsw->frw", np.fft.rfft(answer, size, 0), np.fft.rfft(step, size, 0))
+    found = np.abs(np.fft.irfft(both, size, 0)[: len(step)])
+    return digits(found + 1e-9 * found.max((0, 2), keepdims=True), 6) * (1 + 1e-5)
 
 
 @dataclass(frozen=True)
@@ -353,8 +371,8 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
     widen = DOUBLE if fixed else 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
     up: Callable[[Array], Array] = np.asarray if fixed else up32
     slow = decay * SLOWER
-    last = moving.forgotten(driven, limit, steady)
     settle = fixed.like.settle if fixed else max(start.settled(driven, limit, steady, slow) for start in (rest, moving))
+    last = max(moving.forgotten(driven, limit, steady), settle)
     return HullTables(
         weight=up(used * widen),
         taps=tuple(int(t) for t in taps),

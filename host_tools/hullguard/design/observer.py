@@ -256,10 +256,10 @@ def _lyapunov_factor(F: Array, E: Array) -> Array:
     raise np.linalg.LinAlgError("a pole on the unit circle")
 
 
-def no_filter(order: int) -> PostFilter:
-    """The post-filter that does nothing, for one residual."""
-    empty = np.zeros((order, order))
-    return PostFilter(np.zeros((order, 1)), np.eye(1), empty, np.eye(1), np.zeros((order, 0)), np.zeros((1, 0)), 0.0)
+def no_filter(order: int, residuals: int = 1) -> PostFilter:
+    """The post-filter that does nothing."""
+    empty, same = np.zeros((order, order)), np.eye(residuals)
+    return PostFilter(np.zeros((order, residuals)), same, empty, same, np.zeros((order, 0)), np.zeros((residuals, 0)), 0.0)
 
 
 def fused(o: ObserverMatrices, f: PostFilter) -> tuple[Array, Array, Array, Array]:

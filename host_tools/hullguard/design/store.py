@@ -11,6 +11,7 @@ import numpy as np
 import tomli_w
 
 from hullguard.design.bank_types import StoredBank
+from hullguard.design.uio_types import UIO_MATRICES, StoredUio
 from hullguard.errors import InputError
 from hullguard.model.table import Array, Table
 
@@ -49,6 +50,7 @@ class Stored:
     dA: Array | None = None  # of an uncertain plant only
     dB: Array | None = None
     banks: tuple[StoredBank, ...] = ()
+    uios: tuple[StoredUio, ...] = ()
 
 
 def path_of(model_path: Path) -> Path:
@@ -83,6 +85,8 @@ def write(path: Path, name: str, stored: Stored) -> None:
         data["plant"]["gain"] = stored.gain.tolist()
     if stored.dA is not None and stored.dB is not None:
         data["plant"] |= {"dA": stored.dA.tolist(), "dB": stored.dB.tolist()}
+    if stored.uios:
+        data["uio"] = [{name: getattr(u, name).tolist() for name in UIO_MATRICES} | {"fixed": [[z.real, z.imag] for z in u.fixed]} for u in stored.uios]
     if stored.banks:
         data["banks"] = [_bank(b) for b in stored.banks]
     path.write_text(HEADER.format(name=name) + tomli_w.dumps(data), encoding="utf-8")
@@ -102,6 +106,14 @@ def _read_bank(t: Table) -> StoredBank:
     bank = StoredBank(window, rows.reshape(len(rows), window, -1), t.whole("faults", 0, 2**32 - 1), hypothesis)
     t.close()
     return bank
+
+
+def _read_uio(t: Table) -> StoredUio:
+    found = {name: t.matrix(name) for name in UIO_MATRICES[:-1]}
+    fixed = t.raw("fixed")
+    made = StoredUio(**found, passing=t.vector("passing", len(found["state"]), 0.0), fixed=t.matrix("fixed", None, 2) @ np.array([1, 1j]) if fixed else np.zeros(0))
+    t.close()
+    return made
 
 
 def read(path: Path) -> Stored | None:
@@ -155,6 +167,7 @@ def read(path: Path) -> Stored | None:
         dA=plant.matrix("dA", *A.shape) if "dA" in plant else None,
         dB=(plant.matrix("dB", *B.shape) if B.size else B) if "dB" in plant else None,
         banks=tuple(_read_bank(t) for t in top.tables("banks", optional=True)),
+        uios=tuple(_read_uio(t) for t in top.tables("uio", optional=True)),
     )
     for t in (plant, signals, top):
         t.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
@@ -113,6 +114,20 @@ class MismatchTable:
     exponent: int = 0
 
 
+Rows = Sequence[Sequence[float]]
+
+
+def blocks(weight: Sequence[Rows], taps: Sequence[int], tail: Rows) -> list[tuple[int, int, list[list[float]]]]:
+    """Weights (lags x residuals x signals) and tails (residuals x signals) as hg_hull_config has them; see GeneratorTable.blocks."""
+    made = []
+    for first in range(0, len(tail), 2):
+        pair = range(first, min(first + 2, len(tail)))
+        for g, count in enumerate(taps):
+            lags = [[weight[lag][i][g] for i in pair] for lag in range(count)]
+            made.append((first, g, [*lags, [tail[i][g] for i in pair]]))
+    return made
+
+
 @dataclass(frozen=True)
 class GeneratorTable:
     """hg_residual_config and hg_hull_config."""
@@ -143,13 +158,18 @@ class GeneratorTable:
     @property
     def blocks(self) -> list[tuple[int, int, list[list[float]]]]:
         """The weights as they lie in memory: (first residual, signal, taps and tail x 2 or 1) for each two residuals, signal after signal."""
-        pairs = [range(i, min(i + 2, len(self.output))) for i in range(0, len(self.output), 2)]
-        made = []
-        for pair in pairs:
-            for g, taps in enumerate(self.taps):
-                lags = [[self.weight[lag][i][g] for i in pair] for lag in range(taps)]
-                made.append((pair[0], g, [*lags, [self.tail[i][g] for i in pair]]))
-        return made
+        return blocks(self.weight, self.taps, self.tail)
+
+
+@dataclass(frozen=True)
+class ModalGeneratorTable(GeneratorTable):
+    """A generator whose threshold has a theta for each mode."""
+
+    mode_decay: tuple[float, ...] = ()
+    mode_input: tuple[tuple[float, ...], ...] = ()  # modes x wide
+    mode_output: tuple[tuple[float, ...], ...] = ()  # residuals x modes
+    mode_rest: tuple[float, ...] = ()
+    mode_moving: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -216,6 +236,7 @@ class Tables:
         """hg_detector_reals(), evaluated here so that the generated storage has exactly that length."""
         own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
         own += sum(len(g.output) if g.zonotope is None else g.zonotope.reals for g in self.generators)
+        own += sum(len(g.mode_decay) for g in self.generators if isinstance(g, ModalGeneratorTable))
         own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
         return 2 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hullguard.model import builders_car
 from hullguard.model.table import Array, Table
 
 SIZE_MAX = 20  # vehicles or cars
@@ -31,6 +32,10 @@ class Builder:
     states: Callable[[int], tuple[str, ...]]
     inputs: Callable[[int], tuple[str, ...]]
     families: Callable[[int], dict[str, list[dict[str, int]]]]  # what a template's `each` can name, with the values of its placeholders
+    least: int = 2  # of its size
+    unknown: Callable[[Table], Array] | None = None  # columns of inputs that nobody knows, n x q; with
+    unknown_names: Callable[[int], tuple[str, ...]] = lambda size: ()
+    components: tuple[str, ...] = ()  # parameters that can lose a share of themselves
 
 
 def _gaps(count: int) -> list[dict[str, int]]:
@@ -80,6 +85,11 @@ def _each(count: int) -> list[dict[str, int]]:
     return [{"i": i} for i in range(1, count + 1)]
 
 
+def _suspension(table: Table) -> Interval:
+    A, B, _ = builders_car.suspension(table)
+    return Interval(A, B, np.zeros_like(A), np.zeros_like(B))
+
+
 BUILDERS = {
     "string_of_vehicles": Builder(
         "vehicles",
@@ -94,5 +104,16 @@ BUILDERS = {
         _car_states,
         lambda count: tuple(f"accel{i}_mps2" for i in range(1, count + 1)),
         lambda count: {"car": _each(count), "gap": _gaps(count)},
+    ),
+    "suspension": Builder(
+        "corners",
+        _suspension,
+        builders_car.state_names,
+        lambda corners: tuple(f"force{i}_n" for i in range(1, corners + 1)),
+        lambda corners: {"corner": _each(corners)},
+        least=1,
+        unknown=lambda table: builders_car.suspension(table)[2],
+        unknown_names=lambda corners: tuple(f"road{i}_mps" for i in range(1, corners + 1)),
+        components=builders_car.COMPONENTS,
     ),
 }

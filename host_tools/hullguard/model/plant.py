@@ -15,6 +15,7 @@ import scipy.linalg
 from hullguard.errors import InputError
 from hullguard.model.builders import BUILDERS, Interval
 from hullguard.model.table import Array, Table
+from hullguard.model.uio import UnknownInputs, read_unknown
 from hullguard.model.uncertain import drawn, enclosure, zero_order_hold
 
 PLANTS = 64  # that stand for an uncertain one in a campaign
@@ -47,6 +48,7 @@ class Plant:
     state_range: Array  # n: |x| in operation as far as it is declared, infinite where it is not
     feedback: Feedback | None
     interval: Interval | None  # what dA and dB were made from; None for a certain plant
+    unknown: UnknownInputs | None  # inputs that nobody knows, of a model of kind "uio"
     hold_s: float | None  # sample time of the zero-order hold between the interval and A, B; None where the model gives discrete matrices
 
     @property
@@ -100,19 +102,20 @@ def _read_matrices(table: Table, outputs: int, inputs: int) -> tuple[Interval, A
 
 def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[str, float], sample_time_s: float) -> Plant:
     """Read the [plant] table. `outputs` and `inputs` are signal names in the model's order; `noise` bounds sensor noise by signal."""
+    builder = None
     if "builder" in table:
         name = table.text("builder", choices=sorted(BUILDERS))
         builder = BUILDERS[name]
         made = builder.make(table)
         size = made.B.shape[1]
         states, names = builder.states(size), builder.inputs(size)
-        for signal in outputs:
+        for signal in outputs if "C" not in table else ():
             if signal not in states:
                 raise InputError(f"signal '{signal}': the builder {name} has no such state; it has {', '.join(states)}")
         if list(names) != inputs:
             raise InputError(f"inputs are {', '.join(inputs) or 'none'}: the builder {name} needs, in this order, {', '.join(names)}")
         hold_s: float | None = sample_time_s
-        C = np.eye(len(states))[[states.index(s) for s in outputs]]
+        C = table.matrix("C", len(outputs), len(states)) if "C" in table else np.eye(len(states))[[states.index(s) for s in outputs]]
         D = np.zeros((len(outputs), len(inputs)))
     else:
         made, C, D = _read_matrices(table, len(outputs), len(inputs))
@@ -125,6 +128,13 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
     dA, dB = (made.A_pm, made.B_pm) if hold_s is None else enclosure(made, hold_s)
     n = A.shape[0]
     Ed, Fd = _disturbance(table, B, D, outputs, inputs, noise)
+    unknown = read_unknown(table, builder, made.A, made.B)
+    if unknown is not None:
+        if hold_s is None:
+            raise table.error("unknown", "inputs that nobody knows act in continuous time; give A and B of continuous time and leave discrete out")
+        # Behind the disturbances, held within a sample: what drives reachable sets and the emulator of campaigns.
+        held = zero_order_hold(made.A, unknown.G, hold_s)[1] * unknown.bound
+        Ed, Fd = np.hstack([Ed, held]), np.hstack([Fd, np.zeros((len(outputs), held.shape[1]))])
     equilibrium = table.vector("equilibrium", n) if "equilibrium" in table else np.zeros(n)
     plant = Plant(
         states=states,
@@ -142,6 +152,7 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         state_range=table.vector("state_range", n, 0.0) if "state_range" in table else np.full(n, np.inf),
         feedback=_feedback(table, A, B) if "feedback" in table else None,
         interval=made if made.A_pm.any() or made.B_pm.any() else None,
+        unknown=unknown,
         hold_s=hold_s,
     )
     table.close()

@@ -15,13 +15,16 @@ import numpy as np
 
 from hullguard.design.protection import MODAL, MODES, NIBBLE_ID_MAX, NONE, PROFILES
 from hullguard.errors import InputError
+from hullguard.model.builders_car import TYRE
 from hullguard.model.choice import read_orders, read_parity, read_poles
 from hullguard.model.detector import DetectorSpec, read_detector
 from hullguard.model.faults import FaultSpec, parse_fault
 from hullguard.model.network import Network, Wire, adopt, check_range
 from hullguard.model.plant import Plant, read_plant
+from hullguard.model.road import RoadSpec, read_road
 from hullguard.model.table import Array, Table
 from hullguard.model.templates import expand
+from hullguard.model.uio import KIND, UioSpec, component_names, read_uios
 
 SCHEMA = 1
 NAME = re.compile(r"^[a-z][a-z0-9_]{0,30}$")
@@ -145,7 +148,7 @@ class Observer:
     @property
     def filtered(self) -> bool:
         """Whether the generator has a post-filter; a difference between events has none, it would forget the frame it starts from."""
-        return self.search.objective != "between events"
+        return self.search.objective not in ("between events", "unknown inputs")
 
 
 @dataclass(frozen=True)
@@ -177,6 +180,7 @@ class Scenario:
     faults: tuple[FaultSpec, ...]
     set: dict[str, Any] = field(default_factory=dict)
     figures: str = ""  # "published": the report of a run begins with the publication's four figures
+    road: RoadSpec | None = None  # what the wheels of a suspension meet
 
 
 @dataclass(frozen=True)
@@ -203,6 +207,7 @@ class Model:
     faults: tuple[Fault, ...]
     scenarios: tuple[Scenario, ...]
     sha256: str  # of everything that a design depends on
+    uios: tuple[UioSpec, ...] = ()
 
     @property
     def outputs(self) -> list[int]:
@@ -213,6 +218,13 @@ class Model:
     def inputs(self) -> list[int]:
         """Places of the plant's inputs u in the signal vector."""
         return [i for i, s in enumerate(self.signals) if s.role == "input"]
+
+    @property
+    def components(self) -> dict[str, int]:
+        """Parts of the plant that a fault can weaken, by name, with the place of the signal that such a fault is like, or shows in first."""
+        names = component_names(self.plant.unknown)
+        acting = {name: self.inputs[corner] for name, (parameter, corner) in names.items() if parameter != TYRE}
+        return acting | {name: self.outputs[0] for name in names if name not in acting}
 
     @property
     def closing(self) -> int:
@@ -235,7 +247,9 @@ class Model:
         for fault in self.faults:
             if fault.name == name:
                 return fault.signal
-        known = ", ".join([s.name for s in self.signals] + [f.name for f in self.faults])
+        if name in self.components:
+            return self.components[name]
+        known = ", ".join([s.name for s in self.signals] + [f.name for f in self.faults] + list(self.components))
         raise InputError(f"'{name}' is neither a signal nor a fault of model {self.name}: {known}")
 
     def scenario(self, name: str | None) -> Scenario:
@@ -346,7 +360,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     if top.whole("schema", 1, 10_000) != SCHEMA:
         raise top.error("schema", f"this version reads schema {SCHEMA}")
     name = _name(top)
-    top.text("kind", choices=["linear"])
+    kind = top.text("kind", choices=["linear", KIND])
     sample_time_s = top.number("sample_time_s", 1e-6, 3600.0)
     bus = top.table("bus", optional=True)
     bitrate = bus.whole("bitrate_bps", 10_000, 8_000_000, 500_000)
@@ -376,7 +390,8 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         for n in bank.faults if bank is not None else ():
             if n not in [f.name for f in faults]:
                 raise inner.error(f"{key}.faults", f"'{n}' is not one of {', '.join(f.name for f in faults) or 'none'}")
-    observers = _read_observers(inner, outputs, inputs, faults)
+    uios = _read_uios(inner, plant, signals, faults) if kind == KIND else ()
+    observers = _read_observers(inner, outputs, inputs, faults) if kind != KIND else ()
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     _free(path, network, [("verdict", verdict), ("status", status), *((g.name, g.frame) for g in groups)])
     scenarios = _read_scenarios(top, path)
@@ -405,7 +420,20 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         faults=faults,
         scenarios=scenarios,
         sha256=_fingerprint(data | {"network": network.plain()} if network.taken else data),
+        uios=uios,
     )
+
+
+def _read_uios(inner: Table, plant: Plant, signals: tuple[Signal, ...], faults: tuple[Fault, ...]) -> tuple[UioSpec, ...]:
+    """The observers of a model of kind "uio"."""
+    if plant.unknown is None:
+        raise inner.error("uio", "there is no input that nobody knows; give [plant.unknown], or make the model linear")
+    named = [(i, s) for i, s in enumerate(signals) if s.role == "output"]
+    made = read_uios(inner, plant.states, [s.name for _, s in named], faults, [i for i, _ in named])
+    if not 1 <= len(made) <= GENERATORS_MAX:
+        raise inner.error("uio", f"{len(made)} observers; 1 .. {GENERATORS_MAX} are possible")
+    inner.close()
+    return made
 
 
 def _fingerprint(data: dict[str, Any]) -> str:
@@ -762,7 +790,8 @@ def _read_scenarios(top: Table, path: Path) -> tuple[Scenario, ...]:
         if not isinstance(overrides, dict):
             raise t.error("set", "expected a table of KEY = VALUE")
         figures = t.text("figures", "", ["published"])
-        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides, figures))
+        road = read_road(t.table("road")) if "road" in t else None
+        scenarios.append(Scenario(t.text("name"), t.whole("samples", 1, 10_000_000), reference, tuple(parse_fault(f) for f in t.names("faults", [])), overrides, figures, road))
         t.close()
     if not scenarios:
         scenarios.append(Scenario("default", 200, Reference("rest", 0.0, 1), ()))

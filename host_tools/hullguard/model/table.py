@@ -33,6 +33,11 @@ class Table:
         self._asked.add(key)
         return key in self._data
 
+    @property
+    def data(self) -> dict[str, Any]:
+        """All of it, unchecked."""
+        return self._data
+
     def error(self, key: str, what: str) -> InputError:
         """An error that names this table and key."""
         return InputError(f"{self.where}.{key}: {what}")

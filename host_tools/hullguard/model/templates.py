@@ -41,11 +41,15 @@ def expand(source: dict[str, Any], where: str) -> dict[str, Any]:
     detector = data.get("detector")
     if isinstance(detector, dict) and "observers" in detector:
         detector["observers"] = _entries(detector["observers"], size, families, f"{where}.detector.observers")
-    for owner, keys in ((data.get("groups"), ("signals",)), (detector.get("observers") if isinstance(detector, dict) else None, ("outputs", "inputs", "faults"))):
+    if isinstance(detector, dict) and "uio" in detector:
+        detector["uio"] = _entries(detector["uio"], size, families, f"{where}.detector.uio")
+    inner = detector if isinstance(detector, dict) else {}
+    named = (("groups", data.get("groups"), ("signals",)), *((f"detector.{k}", inner.get(k), ("outputs", "inputs", "faults")) for k in ("observers", "uio")))
+    for place, owner, keys in named:
         for i, entry in enumerate(owner if isinstance(owner, list) else []):
             for key in keys:
                 if isinstance(entry, dict) and isinstance(entry.get(key), list):
-                    entry[key] = _names(entry[key], size, families, f"{where}.{'groups' if key == 'signals' else 'detector.observers'}[{i}].{key}")
+                    entry[key] = _names(entry[key], size, families, f"{where}.{place}[{i}].{key}")
     _vectors(data, plant, where)
     return data
 
@@ -65,7 +69,7 @@ def _families(data: dict[str, Any], where: str) -> tuple[tuple[str, int] | None,
     if "builder" not in plant:
         return None, {}
     builder = BUILDERS[plant.text("builder", choices=sorted(BUILDERS))]
-    count = plant.whole(builder.size, 2, SIZE_MAX)
+    count = plant.whole(builder.size, builder.least, SIZE_MAX)
     return (builder.size, count), builder.families(count)
 
 
@@ -142,7 +146,7 @@ def _vectors(data: dict[str, Any], plant: dict[str, Any], where: str) -> None:
     """Vectors that are given by what the names begin with, as lists."""
     builder = BUILDERS.get(plant["builder"]) if isinstance(plant.get("builder"), str) else None
     count = plant.get(builder.size) if builder is not None else None
-    known = builder is not None and isinstance(count, int) and not isinstance(count, bool) and 2 <= count <= SIZE_MAX
+    known = builder is not None and isinstance(count, int) and not isinstance(count, bool) and builder.least <= count <= SIZE_MAX
     states = list(builder.states(count)) if known and builder is not None and count is not None else plant.get("states")
     groups = _tables(data.get("groups"))
     order = [n for g in groups for n in _texts(g.get("signals"))]
@@ -155,6 +159,9 @@ def _vectors(data: dict[str, Any], plant: dict[str, Any], where: str) -> None:
     wanted += [(feedback, key, inputs, "plant.feedback") for key in ("input_weights", "reference_bound")]
     for i, g in enumerate(groups):
         wanted.append((g.get("trigger"), "sigma", _texts(g.get("signals")), f"groups[{i}].trigger"))
+    detector = data.get("detector")
+    for i, u in enumerate(_tables(detector.get("uio")) if isinstance(detector, dict) else []):
+        wanted.append((u, "trust", states, f"detector.uio[{i}]"))
     for table, key, names, place in wanted:
         if names != [] and isinstance(table, dict) and isinstance(table.get(key), dict):
             table[key] = _vector(table[key], names, f"{where}.{place}.{key}")

@@ -21,6 +21,7 @@ from hullguard.design.protection import MODAL, NONE
 from hullguard.design.tables import GeneratorTable, MessageTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from hullguard.report import uio_design
 from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section, uncertain_names
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
@@ -64,6 +65,7 @@ def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
         yield from _generator(design, i, g)
         if folded:
             yield "</details>"
+    yield from uio_design.section(design)
     yield from banks_section(design)
     yield from isolability_section(design, pairs)
     yield from derived_section(design)
@@ -91,6 +93,9 @@ def _summary(design: Design) -> Iterator[str]:
         yield f"<aside><p>{told}</p></aside>"
     tiles = [tile("checks", f"{passed} of {len(design.checks)}", "passed", "good" if passed == len(design.checks) else "bad")]
     tiles.append(tile("bus load, worst case", percent(design.load_bound), f"limit {percent(model.load_max)}", "good" if design.load_bound <= model.load_max else "bad"))
+    f32, q31 = (max(design.rounding_shares(real), default=0.0) for real in ("f32", "q31"))
+    if design.tables.fixed is not None and design.generators:
+        tiles.append(tile("rounding, fixed point", percent(q31), f"of a threshold; {percent(f32)} in float32"))
     best = _smallest(design)
     if best:
         name, size = max(best.items(), key=lambda kv: kv[1])

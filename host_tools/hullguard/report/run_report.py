@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from hullguard.design.judges import BANK
 from hullguard.errors import InputError
 from hullguard.model.detector import PUBLISHED
-from hullguard.report import published
+from hullguard.report import published, uio_section
 from hullguard.report import run_figures as draw
 from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
 from hullguard.report.run_data import FaultRun, Run, read_run
@@ -58,7 +58,7 @@ def write_run_report(directory: Path) -> Path:
     """Read a finished run's directory and write report.html into it."""
     run = read_run(directory)
     with mpl.rc_context(RC):
-        text = page(f"Run of {run.info['model']}", _body(run))
+        text = page(f"Run of {run.info['model']}", _body(run, uio_section.read_estimates(directory, run.info)))
     path = directory / "report.html"
     _write(path, text.encode())
     return path
@@ -85,12 +85,13 @@ def _write(path: Path, data: bytes) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _body(run: Run) -> Iterator[str]:
+def _body(run: Run, estimates: Sequence[uio_section.Estimate]) -> Iterator[str]:
     yield from _summary(run)
     whole = draw.whole(run)
     shown, hidden, judges = draw.chosen_residuals(run)
     if run.before:
         yield from published.section(run)
+    yield from uio_section.section(run, estimates)
 
     yield "<h2>Residuals and thresholds</h2>"
     left = ""

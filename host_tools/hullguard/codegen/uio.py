@@ -1,0 +1,241 @@
+"""NAME_uio.h and NAME_uio.c: the tables of a model's unknown-input observers with all estimates (uio.h), and of what isolates their faults (isolate.h)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hullguard.codegen.c import banner, comment, fill, real, reals, table, unsigned
+from hullguard.core.native_uio import UioTable
+from hullguard.design.arith import nearest32
+from hullguard.design.design import Design
+from hullguard.design.tables import rows
+from hullguard.design.uio_generator import UioDesign, uio_table
+from hullguard.design.uio_isolate import Isolation, isolations
+from hullguard.model.table import Array
+
+
+@dataclass(frozen=True)
+class _Names:
+    """What the C code calls a model."""
+
+    model: str
+
+    @property
+    def macro(self) -> str:
+        return f"HG_{self.model.upper()}_UIO"
+
+    @property
+    def prefix(self) -> str:
+        return f"hg_{self.model}_uio"
+
+
+def emit_uio(design: Design) -> tuple[str, str]:
+    """Header and source."""
+    names = _Names(design.tables.name)
+    every = [isolations(design.model, u) for u in design.uios]
+    return _header(design, names, every), _source(design, names, every)
+
+
+def _matrix(name: str, a: Array, about: str) -> list[str]:
+    return table("hg_real", name, f"{a.shape[0]}][{a.shape[1]}", [reals(r) for r in rows(nearest32(a))], about) if a.size else []
+
+
+def _vector(name: str, a: Array, about: str) -> list[str]:
+    return table("hg_real", name, f"{len(a)}", [reals(float(x) for x in nearest32(a))], about) if a.size else []
+
+
+def _reals(u: UioTable, isolated: Sequence[Isolation]) -> str:
+    """Memory of one observer and its isolations, in the library's own words: no size is computed twice."""
+    own = [f"HG_UIO_REALS({len(u.state)}U, {len(u.signal)}U, {u.estimates}U, {len(u.mode_decay)}U)"]
+    return " + ".join(own + [f"HG_ISOLATE_REALS({len(i.table.whole)}U, {i.table.blocks}U)" for i in isolated])
+
+
+def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> str:
+    guard, made = f"HULLGUARD_MODEL_{names.model.upper()}_UIO_H", [uio_table(u) for u in design.uios]
+    isolated, estimates = sum(len(i) for i in every), sum(len(u.names) for u in design.uios)
+    lines = [
+        *banner(design, "its unknown-input observers, all estimates with their radii."),
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        '#include "hullguard/isolate.h"',
+        '#include "hullguard/uio.h"',
+        "",
+        f"#define {names.macro}S {len(made)}U /* observers */",
+        f"#define {names.macro}_ISOLATIONS {isolated}U /* estimates of actuators' faults that are told apart from weaker parts */",
+        f"#define {names.macro}_ESTIMATES {estimates}U /* of all observers, one after another */",
+        "",
+        *comment("Places of the estimates: faults of actuators, of sensors, unknown inputs, states; of each observer in turn."),
+        "enum {",
+    ]
+    place = 0
+    for i, u in enumerate(design.uios):
+        for name in u.names:
+            lines.append(f"    {names.macro}{i + 1}_{name.upper()} = {place},")
+            place += 1
+    lines[-1] = lines[-1].rstrip(",")
+    lines += [
+        "};",
+        "",
+        f"extern const hg_uio_config {names.prefix}_config[{len(made)}];",
+        *([f"extern const hg_isolate_config {names.prefix}_isolate_config[{isolated}];"] if isolated else []),
+        "",
+        "/* Memory of all of them. */",
+        "typedef struct {",
+        f"    hg_uio       uio[{len(made)}];",
+        *([f"    hg_isolate   isolate[{isolated}];", f"    hg_isolation found[{isolated}];"] if isolated else []),
+        f"    hg_real      estimate[{estimates}];",
+        f"    hg_real      radius[{estimates}];",
+        "    hg_real      real[" + " +\n                      ".join(_reals(u, i) for u, i in zip(made, every, strict=True)) + "];",
+        f"}} {names.prefix};",
+        "",
+        "/** Begin, beside a detector of the same model that has just been started.",
+        " *  @param[out] self  memory, owned by the caller  @param[in] how  what is known of the plant's motion, as the detector was told",
+        " *  @retval HG_OK          ready",
+        " *  @retval HG_E_ARGUMENT  a null pointer",
+        " *  @retval HG_E_CONFIG    tables contradict one another, or the detector's ring */",
+        f"hg_status {names.prefix}_start({names.prefix} *self, const hg_detector *detector, hg_start how);",
+        "",
+        "/** The sample that the detector has just closed: self->estimate, self->radius and self->found are then its.",
+        " *  Begins again where the detector did.",
+        " *  @retval HG_OK         all have moved on",
+        " *  @retval HG_E_NUMERIC  one refused a number that is not finite; see hg_uio_follow() and hg_isolate_step() */",
+        f"hg_status {names.prefix}_follow({names.prefix} *self, const hg_detector *detector);",
+        "",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _observer(u: UioDesign, t: UioTable, n: str, signals: Sequence[str]) -> list[str]:
+    lines = [f"/* ---- Observer {n.removeprefix('observer')}: {', '.join(u.names)} ---- */", ""]
+    lines += table("uint8_t", f"{n}_signal", f"{len(t.signal)}", [unsigned(t.signal)], "places of the signals it reads: " + ", ".join(signals[i] for i in t.signal))
+    for part, about in (("state", "next state from state"), ("input", "next state from signals"), ("output", "estimates from state"), ("direct", "estimates from signals")):
+        lines += _matrix(f"{n}_{part}", getattr(t, part), f"{about}, row-major")
+    lines += table("uint8_t", f"{n}_taps", f"{len(t.taps)}", [unsigned(t.taps)], "lags that are summed one by one, by signal")
+    about = "magnitude of the impulse response by two estimates, signal and lag, each with a tail of 0 behind"
+    lines += [*comment(f"{n}_weight [{sum(x + 1 for x in t.taps) * t.estimates}]: {about}")]
+    lines.append(f"static const hg_real {n}_weight[] = {{")
+    for first, signal, block in t.blocks:
+        lines.append(f"    /* estimates from {u.names[first]} on, {signals[t.wide[signal]]} */")
+        lines += fill([x for row in block for x in reals(row)])
+    lines += ["};", ""]
+    for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
+        lines += _matrix(f"{n}_{part}", getattr(t, part), f"radii's part from initial state, disturbance, unknown inputs between samples and rounding, by sample {start}")
+    lines += _vector(f"{n}_bias", t.bias, "the same from then on")
+    lines += table("hg_real", f"{n}_none", f"{t.estimates}", [reals([0.0] * t.estimates)], "no tail of a residual: each mode has its own")
+    lines += _vector(f"{n}_mode_decay", t.mode_decay, "what a mode has left after a sample")
+    lines += _matrix(f"{n}_mode_input", t.mode_input, "weight of a radius older than the taps in each mode")
+    lines += _matrix(f"{n}_mode_output", t.mode_output, "estimate's radius a unit of each mode")
+    lines += _vector(f"{n}_mode_rest", t.mode_rest, "modes after a start within the initial range")
+    return lines + _vector(f"{n}_mode_moving", t.mode_moving, "modes after a start in a moving plant")
+
+
+def _config(t: UioTable, n: str) -> list[str]:
+    order, width, estimates = len(t.state), len(t.signal), t.estimates
+    shape = {"state": (order, order), "input": (order, width), "output": (estimates, order), "direct": (estimates, width)}
+    tied = [f"                  .{part} = {{.rows = {r}U, .cols = {c}U, .exponent = 0, .data = {n}_{part}}}" for part, (r, c) in shape.items()]
+    return [
+        f"    {{.actuators = {t.actuators}U, .sensors = {t.sensors}U, .unknown = {t.unknown}U, .states = {t.states}U,",
+        f"     .observer = {{.order = {order}U, .residuals = {estimates}U, .width = {width}U, .signal = {n}_signal,",
+        *(line + "," for line in tied[:-1]),
+        tied[-1] + "},",
+        f"     .hull = {{.residuals = {estimates}U, .width = {len(t.wide)}U, .signal = {n}_signal, .taps = {n}_taps, .weight = {n}_weight,",
+        f"              .settle = {len(t.rest)}U, .rest = {n}_rest, .rest_left = {n}_none, .moving = {n}_moving, .moving_left = {n}_none, .bias = {n}_bias,",
+        f"              .ready_rest = {t.ready_rest}U, .ready_moving = {t.ready_moving}U,",
+        f"              .decay = {n}_none,",
+        f"              .modes = {len(t.mode_decay)}U, .mode_decay = {n}_mode_decay, .mode_input = {n}_mode_input, .mode_output = {n}_mode_output,",
+        f"              .mode_rest = {n}_mode_rest, .mode_moving = {n}_mode_moving}}}},",
+    ]
+
+
+def _isolate(i: Isolation, n: str, estimates: int) -> tuple[list[str], list[str]]:
+    """Tables, and the entry of the configuration."""
+    t = i.table
+    lines = _matrix(f"{n}_whole", t.whole, "force of the whole of each part from the estimates: " + ", ".join(i.names[1 : 1 + len(t.whole)]))
+    lines += _vector(f"{n}_excitation", t.excitation, "smallest scatter of that force that says something")
+    if t.sensor:
+        lines += table("uint8_t", f"{n}_sensor", f"{len(t.sensor)}", [unsigned(t.sensor)], "rows of sensors' faults")
+        lines += table("hg_real", f"{n}_sensor_limit", f"{len(t.sensor)}", [reals(t.sensor_limit)], "smallest magnitude of them that counts")
+    numbers = [float(nearest32(x)) for x in (t.limit, t.low_pass, t.explained, t.steady)]  # type: ignore[arg-type]
+    sensor = (f"{n}_sensor", f"{n}_sensor_limit") if t.sensor else ("NULL", "NULL")
+    return lines, [
+        f"    {{.estimates = {estimates}U, .actuator = {t.actuator}U, .limit = {real(numbers[0])},",
+        f"     .sensors = {len(t.sensor)}U, .sensor = {sensor[0]}, .sensor_limit = {sensor[1]},",
+        f"     .components = {len(t.whole)}U, .whole = {n}_whole, .excitation = {n}_excitation,",
+        f"     .low_pass = {real(numbers[1])}, .settle = {t.settle}U, .release = {t.release}U, .block = {t.block}U, .blocks = {t.blocks}U,",
+        f"     .explained = {real(numbers[2])}, .steady = {real(numbers[3])}}},",
+    ]
+
+
+def _source(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> str:
+    signals = [s.name for s in design.model.signals]
+    lines = [*banner(design, "tables of its unknown-input observers."), f'#include "{names.model}_uio.h"', "", "#include <stddef.h>", ""]
+    configs: list[str] = []
+    for k, u in enumerate(design.uios):
+        t = uio_table(u)
+        lines += _observer(u, t, f"observer{k + 1}", signals)
+        configs += _config(t, f"observer{k + 1}")
+    entries: list[str] = []
+    for k, (u, isolated) in enumerate(zip(design.uios, every, strict=True)):
+        for j, i in enumerate(isolated):
+            own, entry = _isolate(i, f"isolate{k + 1}_{j + 1}", len(u.names))
+            lines, entries = lines + own, entries + entry
+    lines += [f"const hg_uio_config {names.prefix}_config[{len(design.uios)}] = {{", *configs, "};", ""]
+    if entries:
+        lines += [f"const hg_isolate_config {names.prefix}_isolate_config[{sum(len(i) for i in every)}] = {{", *entries, "};", ""]
+    return "\n".join(lines + _start(design, names, every) + [""] + _follow(design, names, every)) + "\n"
+
+
+def _start(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> list[str]:
+    lines = [
+        f"hg_status {names.prefix}_start({names.prefix} *self, const hg_detector *detector, hg_start how)",
+        "{",
+        "    if ((self == NULL) || (detector == NULL)) {",
+        "        return HG_E_ARGUMENT;",
+        "    }",
+        "    hg_real *memory = self->real;",
+        "    hg_status status = HG_OK;",
+    ]
+    count = 0
+    for k, (u, isolated) in enumerate(zip(design.uios, every, strict=True)):
+        t = uio_table(u)
+        lines += [
+            "    if (status == HG_OK) {",
+            f"        status = hg_uio_start(&self->uio[{k}], &{names.prefix}_config[{k}], &detector->radii, how, memory);",
+            f"        memory = &memory[{_reals(t, [])}];",
+            "    }",
+        ]
+        for i in isolated:
+            lines += [
+                "    if (status == HG_OK) {",
+                f"        status = hg_isolate_start(&self->isolate[{count}], &{names.prefix}_isolate_config[{count}], memory);",
+                f"        memory = &memory[HG_ISOLATE_REALS({len(i.table.whole)}U, {i.table.blocks}U)];",
+                "    }",
+            ]
+            count += 1
+    return [*lines, "    (void)memory;", "    return status;", "}"]
+
+
+def _follow(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> list[str]:
+    lines = [f"hg_status {names.prefix}_follow({names.prefix} *self, const hg_detector *detector)", "{"]
+    if any(every):
+        lines.append("    const bool again = self->uio[0].beginnings != detector->beginnings;")
+    lines += ["    hg_status status = HG_OK;", "    hg_status own;"]
+    if any(every):
+        lines += [f"    for (uint8_t i = 0U; again && (i < {names.macro}_ISOLATIONS); i++) {{", "        hg_isolate_reset(&self->isolate[i]);", "    }"]
+    place = count = 0
+    for k, (u, isolated) in enumerate(zip(design.uios, every, strict=True)):
+        lines += [
+            f"    own = hg_uio_follow(&self->uio[{k}], detector, &self->estimate[{place}], &self->radius[{place}]);",
+            "    status = (own == HG_OK) ? status : own;",
+        ]
+        for _ in isolated:
+            lines += [
+                f"    own = hg_isolate_step(&self->isolate[{count}], &self->estimate[{place}], &self->radius[{place}], &self->found[{count}]);",
+                "    status = (own == HG_OK) ? status : own;",
+            ]
+            count += 1
+        place += len(u.names)
+    return [*lines, "    return status;", "}"]
