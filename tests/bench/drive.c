@@ -54,7 +54,7 @@ static void make_steps(drive *d)
 static void speak(drive *d, uint32_t k)
 {
     const hg_node_config *const config = &record_config;
-    const int16_t *code = &record_code[k * RECORD_SIGNALS];
+    const int32_t *code = &record_code[k * RECORD_SIGNALS];
     hg_real value[RECORD_SIGNALS];
     hg_can_frame frame;
     hg_can_frame closing = {.id = 0U};

@@ -60,7 +60,7 @@ typedef hg_{name}_node record_node;
 typedef hg_{name}_senders record_senders;
 
 /* [samples][signals] */
-static const int16_t record_code[] = {{
+static const int32_t record_code[] = {{
 {codes}
 }};
 

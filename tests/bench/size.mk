@@ -7,7 +7,7 @@ SIZE_PARTS := detector node sensor
 # The part of it in `make test`: two instruction sets, with an FPU and without.
 SIZE_QUICK := cortex_m4f rv32imac
 
-size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(MODELS),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
+size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(filter-out $(NOT_$(r)),$(MODELS)),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
 size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
 size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '$(call size_cross,$(1))' $(2) $(call size_elfs,$(1))
 
@@ -32,6 +32,6 @@ endef
 
 define size_target
 $(eval $(call objects,$(BENCH)/$(1)-$(2),tests/bench/size_port.c,$$(call bench_cc,$(1),$(2))))
-$(foreach m,$(MODELS),$(foreach p,$(SIZE_PARTS),$(eval $(call size_program,$(1),$(2),$(m),$(p)))))
+$(foreach m,$(filter-out $(NOT_$(2)),$(MODELS)),$(foreach p,$(SIZE_PARTS),$(eval $(call size_program,$(1),$(2),$(m),$(p)))))
 endef
 $(foreach r,$(BENCH_REALS),$(foreach t,$(TARGETS),$(eval $(call size_target,$(t),$(r)))))
