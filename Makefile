@@ -122,9 +122,11 @@ TEST_PARTS += unit
 run_test = timeout --foreground -k 5 300 $(1) >$(2).log 2>&1 && touch $(2).ok && echo "  ok  $(2)" \
            || { cat $(2).log; echo "FAILED $(2)"; exit 1; }
 
-# The tables of the models are floats.
+# The tables of the models are floats; models that need an optional part do not compile without it.
+$(foreach r,$(FLOATS),$(eval UNIT_MODELS_$(r) := $(MODEL_SRC)))
+UNIT_MODELS_bare := $(filter-out $(patsubst %.h,%.c,$(shell grep -l '^.if !HG_WITH_' firmware/models/*.h)),$(MODEL_SRC))
 unit_tests = $(or $(UNIT_TESTS_$(1)),$(UNIT_TESTS))
-unit_src   = $(LIB_SRC) $(if $(filter q31,$(1)),,$(MODEL_SRC)) $(HOST_HAL_SRC)
+unit_src   = $(LIB_SRC) $(UNIT_MODELS_$(1)) $(HOST_HAL_SRC)
 
 define unit_variant
 $(eval $(call objects,$(BUILD)/unit/$(1)-$(2),$(call unit_src,$(2)),$$(CC_$(1)) $(REAL_FLAG_$(2))))

@@ -4,7 +4,7 @@ DECLARATIONS := $(REALS:%=$(BUILD)/lib/hullguard_%.i)
 lib: $(DECLARATIONS)
 
 define declarations
-$(BUILD)/lib/hullguard_$(1).i: host_tools/hullguard/core/host.h $(wildcard firmware/include/hullguard/*.h)
+$(BUILD)/lib/hullguard_$(1).i: host_tools/hullguard/core/host.h $(wildcard host_tools/hullguard/core/*.h firmware/include/hullguard/*.h)
 	@mkdir -p $$(@D)
 	$$(Q)$$(CC) -E -P -nostdinc $(REAL_FLAG_$(1)) -Ihost_tools/hullguard/core/declare -Ifirmware/include $$< -o $$@
 endef

@@ -5,7 +5,8 @@
  *  closed without it, and an outage is told to the node.
  *
  *  Prints `ready` when it listens. One character on the console asks for more: `h` prints every counter of every group and `end`,
- *  `r` begins anew, in lockstep and at rest, with empty counters, and prints `ready`, `t` likewise, but timed and in a moving plant, `q` ends. */
+ *  `r` begins anew, in lockstep and at rest, with empty counters, and prints `ready`; so do `f`, which neither answers every closing frame nor
+ *  has a deadline, and `t`, timed and in a moving plant; `q` ends. */
 #include "board.h"
 #include "platoon.h"
 
@@ -24,8 +25,9 @@ typedef struct {
     uint32_t      unsent;  /* frames that found no room or no bus */
     uint32_t      missed;  /* deadlines */
     uint32_t      outages; /* told to the node */
+    bool          lockstep; /* answers every closing frame */
     bool          timed;
-    uint64_t      deadline_us;   /* HG_HAL_FOREVER: in lockstep */
+    uint64_t      deadline_us;   /* HG_HAL_FOREVER: not timed */
     uint64_t      closing_us;    /* arrival of the last closing frame */
     uint32_t      closing_steps; /* `steps` after its own */
 } app;
@@ -47,7 +49,7 @@ static void make_steps(app *self)
     hg_verdict verdict;
     hg_can_frame frame[2];
     while (hg_node_step(&storage.node, &verdict) == HG_OK) {
-        const uint8_t frames = hg_node_report(&storage.node, &verdict, (!self->timed) && (storage.node.due == 0U), frame);
+        const uint8_t frames = hg_node_report(&storage.node, &verdict, self->lockstep && (storage.node.due == 0U), frame);
         for (uint8_t i = 0U; i < frames; i++) {
             send_frame(self, &frame[i]);
         }
@@ -140,10 +142,10 @@ static void say_health(app *self)
     hg_board_say("end\n");
 }
 
-/* Only the groups' frames are of interest. */
-static uint32_t begin(app *self, bool timed)
+/* As the key says: `r`, `f` or `t`. Only the groups' frames are of interest. */
+static uint32_t begin(app *self, int key)
 {
-    *self = (app){.timed = timed, .deadline_us = HG_HAL_FOREVER};
+    *self = (app){.lockstep = key == 'r', .timed = key == 't', .deadline_us = HG_HAL_FOREVER};
     for (uint8_t i = 0U; i < HG_PLATOON_GROUPS; i++) {
         const hg_message *const message = &hg_platoon_config.message[i];
         self->filter[i] = (hg_hal_filter){.id = message->id, .mask = HG_CAN_ID_EXTENDED, .flags = message->flags & HG_CAN_EXTENDED};
@@ -152,11 +154,11 @@ static uint32_t begin(app *self, bool timed)
         hg_board_say("no CAN controller\n");
         return EXIT_BUS;
     }
-    if (hg_platoon_node_start(&storage, timed ? HG_START_MOVING : HG_START_REST) != HG_OK) {
+    if (hg_platoon_node_start(&storage, self->timed ? HG_START_MOVING : HG_START_REST) != HG_OK) {
         hg_board_say("model does not start: generate its tables again\n");
         return EXIT_FAILED;
     }
-    if (timed) { /* a bus that stays silent has to be reported from the start */
+    if (self->timed) { /* a bus that stays silent has to be reported from the start */
         self->deadline_us = hg_hal_now_us(&self->hal) + PERIOD_US + SLACK_US;
     }
     hg_board_say("ready\n");
@@ -166,7 +168,7 @@ static uint32_t begin(app *self, bool timed)
 int main(void)
 {
     static app self;
-    uint32_t status = begin(&self, false);
+    uint32_t status = begin(&self, 'r');
     int key = 0;
     while ((status == 0U) && (key != 'q')) {
         const uint64_t keys_us = hg_hal_now_us(&self.hal) + KEYS_US;
@@ -175,8 +177,8 @@ int main(void)
         key = hg_board_key();
         if (key == 'h') {
             say_health(&self);
-        } else if ((key == 'r') || (key == 't')) {
-            status = begin(&self, key == 't');
+        } else if ((key == 'r') || (key == 'f') || (key == 't')) {
+            status = begin(&self, key);
         } else {
             /* not for us */
         }

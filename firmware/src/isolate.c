@@ -1,5 +1,7 @@
 #include "hullguard/isolate.h"
 
+#if !HG_REAL_Q31
+
 #include "hullguard/linalg.h"
 
 #include <stddef.h>
@@ -406,3 +408,5 @@ hg_status hg_isolate_step(hg_isolate *self, const hg_real *estimate, const hg_re
     *found = together(self);
     return status;
 }
+
+#endif

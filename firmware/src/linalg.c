@@ -20,9 +20,9 @@ void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, c
 {
     const hg_real *a = m->data;
     const hg_real *b = n->data;
-    for (uint8_t i = 0U; i < m->rows; i += 2U) {
+    for (uint16_t i = 0U; i < m->rows; i += 2U) { /* 16 bits: 255 rows are passed by 256 */
         /* An odd last row goes twice, once for nothing: the cost does not depend on where it is. */
-        const bool two = (uint8_t)(i + 1U) < m->rows;
+        const bool two = (i + 1U) < m->rows;
         hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
         add_rows(&sum, a, two ? &a[m->cols] : a, x, m->cols);
         add_rows(&sum, b, two ? &b[n->cols] : b, y, n->cols);

@@ -1,11 +1,12 @@
 /** @file
  *  What a board without operating system gives to a main: its CAN controller as an hg_hal, a console, an end. One board is linked into an
- *  image; hal/ctucan/board.c and hal/zynqmp_r5/board.c are two. start.S of the board's folder sets up stack and memory and calls main().
+ *  image; hal/ctucan/board.c and hal/zynqmp_r5/board.c are two: hg_board_place() and what is about console, clock and end. start.S of the board's
+ *  folder sets up stack and memory and calls main().
  *  Cost: the console polls its UART; a character waits for room, at most HG_BOARD_SAY_POLLS readings of a register, and is then dropped. */
 #ifndef HULLGUARD_HAL_BOARD_H
 #define HULLGUARD_HAL_BOARD_H
 
-#include "hal.h"
+#include "controller.h"
 
 #define HG_BOARD_SAY_POLLS 100000U
 #define HG_BOARD_DEPTH 128U      /* frames in the receive queue of each controller */
@@ -19,6 +20,12 @@
  *  @retval HG_E_ARGUMENT  no such controller, or a filter that hg_hal_filter_valid() refuses
  *  @retval HG_E_BUS       the controller is not there, or does not come out of its reset */
 hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t count, hg_hal *hal);
+
+/** Where a controller is, made ready to be reached.
+ *  @param[in]  number  0 .. HG_BOARD_CONTROLLERS - 1
+ *  @param[out] place   written whole
+ *  @return false where it is not there */
+bool hg_board_place(uint8_t number, hg_controller_place *place);
 
 /** What waits call between two looks, of controllers started from now on; null, as at the start: nothing. */
 void hg_board_set_idle(void (*function)(void));

@@ -78,15 +78,6 @@ _Noreturn void hg_board_leave(uint32_t status)
 
 /* ---- CAN ---- */
 
-static hg_ctucan controllers[HG_BOARD_CONTROLLERS];
-static hg_queue_slot slots[HG_BOARD_CONTROLLERS][HG_BOARD_DEPTH];
-static void (*idle)(void);
-
-void hg_board_set_idle(void (*function)(void))
-{
-    idle = function;
-}
-
 static bool open_card(void)
 {
     for (uint32_t i = 0U; i < DEVICES; i++) {
@@ -101,31 +92,8 @@ static bool open_card(void)
     return false;
 }
 
-hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t count, hg_hal *hal)
+bool hg_board_place(uint8_t number, hg_controller_place *place)
 {
-    if ((number >= HG_BOARD_CONTROLLERS) || (hal == NULL)) {
-        return HG_E_ARGUMENT;
-    }
-    if (!open_card()) {
-        return HG_E_BUS;
-    }
-    const hg_ctucan_options options = {
-        .core = WINDOW_CORES + (number * CORE_STRIDE), .timing = TIMING, .timing_fd = TIMING_FD, .now_us = hg_board_now_us, .idle = idle,
-        .filters = filters, .filter_count = count, .slots = slots[number], .depth = HG_BOARD_DEPTH,
-    };
-    const hg_status status = hg_ctucan_start(&controllers[number], &options);
-    if (status == HG_OK) {
-        *hal = hg_ctucan_hal(&controllers[number]);
-    }
-    return status;
-}
-
-void hg_board_service(uint8_t number)
-{
-    hg_ctucan_interrupt(&controllers[number]);
-}
-
-void hg_board_stop(uint8_t number)
-{
-    hg_ctucan_stop(&controllers[number]);
+    *place = (hg_controller_place){.type = &hg_ctucan, .base = WINDOW_CORES + (number * CORE_STRIDE), .timing = {TIMING, TIMING_FD}};
+    return open_card();
 }

@@ -55,7 +55,7 @@ static uint32_t dlc_of(uint8_t length)
     return dlc;
 }
 
-static void write_frame(const hg_ctucan *self, uint32_t buffer, const hg_can_frame *frame)
+static void write_frame(const hg_controller_place *at, uint32_t buffer, const hg_can_frame *frame)
 {
     const uint32_t first = TX_BUFFER + (buffer * BUFFER_STRIDE);
     const bool extended = (frame->flags & HG_CAN_EXTENDED) != 0U;
@@ -67,24 +67,24 @@ static void write_frame(const hg_ctucan *self, uint32_t buffer, const hg_can_fra
     form |= extended ? FORM_EXTENDED : 0U;
     form |= ((frame->flags & HG_CAN_FD) != 0U) ? FORM_FD : 0U;
     form |= ((frame->flags & HG_CAN_BRS) != 0U) ? FORM_BRS : 0U;
-    hg_register_write(self->core, first, form);
-    hg_register_write(self->core, first + 1, extended ? frame->id : (frame->id << BASE_SHIFT));
-    hg_register_write(self->core, first + 2, 0U); /* a time that has passed: now */
-    hg_register_write(self->core, first + 3, 0U);
+    hg_register_write(at->base, first, form);
+    hg_register_write(at->base, first + 1, extended ? frame->id : (frame->id << BASE_SHIFT));
+    hg_register_write(at->base, first + 2, 0U); /* a time that has passed: now */
+    hg_register_write(at->base, first + 3, 0U);
     for (uint32_t i = 0U; i < words; i++) {
         const uint8_t *const byte = &frame->data[4U * i];
-        hg_register_write(self->core, first + HEAD_WORDS + i, (uint32_t)byte[0] | ((uint32_t)byte[1] << 8) | ((uint32_t)byte[2] << 16) | ((uint32_t)byte[3] << 24));
+        hg_register_write(at->base, first + HEAD_WORDS + i, (uint32_t)byte[0] | ((uint32_t)byte[1] << 8) | ((uint32_t)byte[2] << 16) | ((uint32_t)byte[3] << 24));
     }
 }
 
 /* Takes the whole frame from the core, however long it says it is. */
-static void read_words(const hg_ctucan *self, uint32_t word[FRAME_WORDS])
+static void read_words(const hg_controller_place *at, uint32_t word[FRAME_WORDS])
 {
     (void)memset(word, 0, FRAME_WORDS * sizeof(word[0]));
-    word[0] = hg_register_read(self->core, RX_DATA);
+    word[0] = hg_register_read(at->base, RX_DATA);
     const uint32_t more = FORM_WORDS(word[0]);
     for (uint32_t i = 1U; i <= more; i++) {
-        const uint32_t next = hg_register_read(self->core, RX_DATA);
+        const uint32_t next = hg_register_read(at->base, RX_DATA);
         if (i < FRAME_WORDS) {
             word[i] = next;
         }
@@ -115,93 +115,68 @@ static bool parse(const uint32_t word[FRAME_WORDS], hg_can_frame *frame)
 
 /* ---- receiving, and the state of the bus ---- */
 
-static void take_frames(hg_ctucan *self)
+static hg_status read(const hg_controller_place *at, hg_can_frame *frame)
 {
     uint32_t word[FRAME_WORDS];
-    hg_can_frame frame;
 
-    for (uint32_t i = 0U; (i < HG_CTUCAN_BURST) && (RX_FRAMES(hg_register_read(self->core, RX_STATUS)) > 0U); i++) {
-        read_words(self, word);
-        if (!parse(word, &frame)) {
-            hg_hal_count(&self->report.malformed, 1U);
-        } else if (hg_hal_filter_passes(self->options.filters, self->options.filter_count, &frame)
-                   && (hg_queue_put(&self->queue, &frame, self->options.now_us()) != HG_OK)) {
-            hg_hal_count(&self->report.lost, 1U);
-        } else {
-            /* queued, or not asked for */
-        }
+    if (RX_FRAMES(hg_register_read(at->base, RX_STATUS)) == 0U) {
+        return HG_E_EMPTY;
     }
-    if ((hg_register_read(self->core, STATUS) & STATUS_OVERRUN) != 0U) {
-        hg_register_write(self->core, COMMAND, COMMAND_CLEAR_OVERRUN);
-        hg_hal_count(&self->report.lost, 1U);
-    }
+    read_words(at, word);
+    return parse(word, frame) ? HG_OK : HG_E_FORMAT;
 }
 
-static void leave_bus_off(hg_ctucan *self)
+static bool overflowed(const hg_controller_place *at)
 {
-    const uint64_t now_us = self->options.now_us();
+    const bool overrun = (hg_register_read(at->base, STATUS) & STATUS_OVERRUN) != 0U;
 
-    if (!self->waiting) {
-        hg_register_write(self->core, TX_COMMAND, TX_COMMAND_ABORT | TX_COMMAND_BUFFER(0U) | TX_COMMAND_BUFFER(1U) | TX_COMMAND_BUFFER(2U) | TX_COMMAND_BUFFER(3U));
-        self->waiting = true;
-        self->restart_us = now_us + HG_CTUCAN_RESTART_US;
-    } else if (now_us >= self->restart_us) {
-        hg_register_write(self->core, COMMAND, COMMAND_RESET_ERRORS);
-        self->restart_us = now_us + HG_CTUCAN_RESTART_US;
-    } else {
-        /* not yet */
+    if (overrun) {
+        hg_register_write(at->base, COMMAND, COMMAND_CLEAR_OVERRUN);
     }
+    return overrun;
 }
 
-static void look_at_state(hg_ctucan *self)
+static bool reported(const hg_controller_place *at)
 {
-    const uint32_t events = hg_register_read(self->core, INT_STAT) & (INT_STATE_CHANGED | INT_BUS_ERROR);
-    const bool enabled = (hg_register_read(self->core, MODE) & MODE_ENABLE) != 0U;
-    const bool warning = (hg_register_read(self->core, STATUS) & STATUS_WARNING) != 0U;
+    const uint32_t events = hg_register_read(at->base, INT_STAT) & (INT_STATE_CHANGED | INT_BUS_ERROR);
 
     if (events != 0U) {
-        hg_register_write(self->core, INT_STAT, events);
-        hg_hal_count(&self->report.errors, 1U);
+        hg_register_write(at->base, INT_STAT, events);
     }
-    self->report.bus = hg_ctucan_fault(hg_register_read(self->core, FAULT) >> FAULT_SHIFT, enabled, warning);
-    if (self->report.bus == HG_BUS_OFF) {
-        leave_bus_off(self);
-    } else {
-        self->waiting = false;
-    }
+    return events != 0U;
 }
 
-void hg_ctucan_interrupt(hg_ctucan *self)
+static hg_bus_state state(const hg_controller_place *at)
 {
-    take_frames(self);
-    look_at_state(self);
+    const bool enabled = (hg_register_read(at->base, MODE) & MODE_ENABLE) != 0U;
+    const bool warning = (hg_register_read(at->base, STATUS) & STATUS_WARNING) != 0U;
+
+    return hg_ctucan_fault(hg_register_read(at->base, FAULT) >> FAULT_SHIFT, enabled, warning);
 }
 
-static hg_status receive(void *object, hg_can_frame *frame, uint64_t *time_us)
+static void withdraw(const hg_controller_place *at)
 {
-    hg_ctucan *const self = object;
+    hg_register_write(at->base, TX_COMMAND, TX_COMMAND_ABORT | TX_COMMAND_BUFFER(0U) | TX_COMMAND_BUFFER(1U) | TX_COMMAND_BUFFER(2U) | TX_COMMAND_BUFFER(3U));
+}
 
-    hg_ctucan_interrupt(self);
-    if (hg_queue_get(&self->queue, frame, time_us) == HG_OK) {
-        hg_hal_count(&self->report.received, 1U);
-        return HG_OK;
-    }
-    return (self->report.bus == HG_BUS_OFF) ? HG_E_BUS : HG_E_EMPTY;
+static void rejoin(const hg_controller_place *at)
+{
+    hg_register_write(at->base, COMMAND, COMMAND_RESET_ERRORS);
 }
 
 /* ---- sending ---- */
 
 /* Finished, failed, aborted or empty: the states 4, 6, 7 and 8. */
-static bool is_free(uint32_t state)
+static bool is_free(uint32_t buffer_state)
 {
-    return state >= 4U;
+    return buffer_state >= 4U;
 }
 
 /* Frames leave in the order of send: while one is pending, each new one gets a priority below all that are. A buffer, or BUFFERS. */
-static uint32_t choose_buffer(const hg_ctucan *self, uint32_t *priority)
+static uint32_t choose_buffer(const hg_controller_place *at, uint32_t *priority)
 {
-    const uint32_t states = hg_register_read(self->core, TX_STATUS);
-    const uint32_t priorities = hg_register_read(self->core, TX_PRIORITY);
+    const uint32_t states = hg_register_read(at->base, TX_STATUS);
+    const uint32_t priorities = hg_register_read(at->base, TX_PRIORITY);
     uint32_t lowest = PRIORITY_MAX + 1U;
     uint32_t buffer = BUFFERS;
 
@@ -219,85 +194,21 @@ static uint32_t choose_buffer(const hg_ctucan *self, uint32_t *priority)
     return (lowest > 1U) ? buffer : BUFFERS;
 }
 
-static hg_status try_send(hg_ctucan *self, const hg_can_frame *frame)
+static bool write(const hg_controller_place *at, const hg_can_frame *frame)
 {
     uint32_t priority = 0U;
+    const uint32_t buffer = choose_buffer(at, &priority);
 
-    if (!hg_hal_sendable(frame)) {
-        return HG_E_FORMAT;
-    }
-    hg_ctucan_interrupt(self);
-    if (self->report.bus == HG_BUS_OFF) {
-        return HG_E_BUS;
-    }
-    const uint32_t buffer = choose_buffer(self, &priority);
     if (buffer == BUFFERS) {
-        return HG_E_BUSY;
+        return false;
     }
-    write_frame(self, buffer, frame);
-    hg_register_write(self->core, TX_PRIORITY, (hg_register_read(self->core, TX_PRIORITY) & ~(0x7U << (4U * buffer))) | (priority << (4U * buffer)));
-    hg_register_write(self->core, TX_COMMAND, TX_COMMAND_READY | TX_COMMAND_BUFFER(buffer));
-    return HG_OK;
+    write_frame(at, buffer, frame);
+    hg_register_write(at->base, TX_PRIORITY, (hg_register_read(at->base, TX_PRIORITY) & ~(0x7U << (4U * buffer))) | (priority << (4U * buffer)));
+    hg_register_write(at->base, TX_COMMAND, TX_COMMAND_READY | TX_COMMAND_BUFFER(buffer));
+    return true;
 }
 
-static hg_status send(void *object, const hg_can_frame *frame)
-{
-    hg_ctucan *const self = object;
-    const hg_status status = try_send(self, frame);
-
-    hg_hal_count((status == HG_OK) ? &self->report.sent : &self->report.refused, 1U);
-    return status;
-}
-
-/* ---- the rest of hal.h ---- */
-
-static void state(void *object, hg_hal_report *out)
-{
-    hg_ctucan *const self = object;
-
-    hg_ctucan_interrupt(self);
-    *out = self->report;
-}
-
-static uint64_t now_us(void *object)
-{
-    const hg_ctucan *const self = object;
-
-    return self->options.now_us();
-}
-
-static hg_status wait(void *object, uint64_t until_us)
-{
-    hg_ctucan *const self = object;
-
-    for (;;) {
-        if (self->stop) {
-            return HG_E_IO;
-        }
-        hg_ctucan_interrupt(self);
-        if (!hg_queue_empty(&self->queue)) {
-            return HG_OK;
-        }
-        if (self->options.now_us() >= until_us) {
-            return HG_E_EMPTY;
-        }
-        if (self->options.idle != NULL) {
-            self->options.idle();
-        }
-    }
-}
-
-/* ---- start and stop ---- */
-
-static bool options_good(const hg_ctucan_options *options)
-{
-    bool good = (options->core != 0U) && ((options->core % 4U) == 0U) && (options->now_us != NULL);
-    good = good && ((options->filters != NULL) || (options->filter_count == 0U));
-    for (size_t i = 0U; good && (i < options->filter_count); i++) {
-        good = hg_hal_filter_valid(&options->filters[i]);
-    }
-    return good;
-}
+/* ---- start ---- */
 
 static bool reset(uintptr_t core)
 {
@@ -307,41 +218,24 @@ static bool reset(uintptr_t core)
         return false;
     }
     hg_register_write(core, MODE, MODE_RESET);
-    while (((hg_register_read(core, MODE) & MODE_RESET) != 0U) && (polls < HG_CTUCAN_RESET_POLLS)) {
+    while (((hg_register_read(core, MODE) & MODE_RESET) != 0U) && (polls < HG_CONTROLLER_RESET_POLLS)) {
         polls++;
     }
-    return polls < HG_CTUCAN_RESET_POLLS;
+    return polls < HG_CONTROLLER_RESET_POLLS;
 }
 
-hg_status hg_ctucan_start(hg_ctucan *self, const hg_ctucan_options *options)
+static bool set_up(const hg_controller_place *at)
 {
-    if ((self == NULL) || (options == NULL) || (!options_good(options))) {
-        return HG_E_ARGUMENT;
+    if (!reset(at->base)) {
+        return false;
     }
-    *self = (hg_ctucan){.options = *options, .core = options->core};
-    const hg_status queue = hg_queue_start(&self->queue, options->slots, options->depth);
-    if (queue != HG_OK) {
-        return queue;
-    }
-    if (!reset(self->core)) {
-        return HG_E_BUS;
-    }
-    hg_register_write(self->core, BTR, options->timing);
-    hg_register_write(self->core, BTR_FD, options->timing_fd);
-    hg_register_write(self->core, TX_PRIORITY, 0U);
-    hg_register_write(self->core, MODE, MODE_FD | MODE_AUTOMATIC | MODE_ENABLE);
-    look_at_state(self);
-    return HG_OK;
+    hg_register_write(at->base, BTR, at->timing[0]);
+    hg_register_write(at->base, BTR_FD, at->timing[1]);
+    hg_register_write(at->base, TX_PRIORITY, 0U);
+    hg_register_write(at->base, MODE, MODE_FD | MODE_AUTOMATIC | MODE_ENABLE);
+    return true;
 }
 
-hg_hal hg_ctucan_hal(hg_ctucan *self)
-{
-    static const hg_hal_ops ops = {send, receive, state, now_us, wait};
-
-    return (hg_hal){.ops = &ops, .self = self};
-}
-
-void hg_ctucan_stop(hg_ctucan *self)
-{
-    self->stop = true;
-}
+const hg_controller_type hg_ctucan = {
+    .fd = true, .set_up = set_up, .read = read, .overflowed = overflowed, .reported = reported, .state = state, .write = write, .withdraw = withdraw, .rejoin = rejoin,
+};

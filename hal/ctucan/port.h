@@ -8,7 +8,7 @@
  *  | transmit priority 0 | the lowest | never sent: the driver uses 1 .. 7 on both |
  *  | time stamp of a received frame | the platform's time base | 0: the driver stamps what it takes from the core, on both |
  *  | buffer of received frames | 32 .. 4096 words, by synthesis | 2048 words |
- *  | FD length between two steps of the DLC | cannot be on a wire | taken from the host's socket, lengthened to the next step |
+ *  | FD length between two steps of the DLC | cannot be on a wire | taken from the host's socket, and said to be of the next step; where that is another number of words the driver finds too few: malformed |
  *  | error frame of the host's socket | cannot be on a wire | arrives as a data frame with the error class as identifier |
  *  | bit timing | obeyed | ignored |
  *  Only the first needs code. */

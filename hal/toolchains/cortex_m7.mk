@@ -1,9 +1,5 @@
 # Cortex-M7 with its single-precision FPU. QEMU's mps2-an500.
-CROSS_cortex_m7      := arm-none-eabi-
+FAMILY_cortex_m7     := cortex_m
 MACHINE_cortex_m7    := -mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
-REAL_cortex_m7       := f32
-ENDIAN_cortex_m7     := little
-LIBC_cortex_m7       := newlib
-START_cortex_m7      := hal/cortex_m/start.c
 MEMORY_cortex_m7     := ROM=0x00000000 ROM_SIZE=1M RAM=0x20000000 RAM_SIZE=4M
 RUN_cortex_m7        := qemu-system-arm -M mps2-an500 $(SEMIHOSTING)

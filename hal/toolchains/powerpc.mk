@@ -2,7 +2,6 @@
 # tests are static Linux programs under qemu-user.
 CROSS_powerpc        := powerpc-linux-gnu-
 MACHINE_powerpc      := -mcpu=powerpc -mbig-endian -mhard-float -msdata=none -fno-pie -fno-stack-protector
-REAL_powerpc         := f32
 ENDIAN_powerpc       := big
 LIBC_powerpc         := glibc
 START_powerpc        := hal/start/powerpc.S

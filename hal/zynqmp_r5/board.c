@@ -97,37 +97,8 @@ _Noreturn void hg_board_leave(uint32_t status)
 
 /* ---- CAN ---- */
 
-static hg_zynqmp_can controllers[HG_BOARD_CONTROLLERS];
-static hg_queue_slot slots[HG_BOARD_CONTROLLERS][HG_BOARD_DEPTH];
-static void (*idle)(void);
-
-void hg_board_set_idle(void (*function)(void))
+bool hg_board_place(uint8_t number, hg_controller_place *place)
 {
-    idle = function;
-}
-
-hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t count, hg_hal *hal)
-{
-    if ((number >= HG_BOARD_CONTROLLERS) || (hal == NULL)) {
-        return HG_E_ARGUMENT;
-    }
-    const hg_zynqmp_can_options options = {
-        .base = CAN + (number * CAN_STRIDE), .prescaler = PRESCALER, .timing = TIMING, .now_us = hg_board_now_us, .idle = idle,
-        .filters = filters, .filter_count = count, .slots = slots[number], .depth = HG_BOARD_DEPTH,
-    };
-    const hg_status status = hg_zynqmp_can_start(&controllers[number], &options);
-    if (status == HG_OK) {
-        *hal = hg_zynqmp_can_hal(&controllers[number]);
-    }
-    return status;
-}
-
-void hg_board_service(uint8_t number)
-{
-    hg_zynqmp_can_interrupt(&controllers[number]);
-}
-
-void hg_board_stop(uint8_t number)
-{
-    hg_zynqmp_can_stop(&controllers[number]);
+    *place = (hg_controller_place){.type = &hg_zynqmp_can, .base = CAN + (number * CAN_STRIDE), .timing = {PRESCALER, TIMING}};
+    return true;
 }

@@ -20,8 +20,10 @@ from hullguard.core.native import Frame
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "node"))  # for those who import this first: what runs inside with-vcan shares inside_support
 IMAGES = ROOT / "build" / "boards"
+FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 START_S = 60.0
 ANSWER_S = 10.0
+QUIET_S = 0.02
 
 
 def _ctucan(image: Path, channel: str | None) -> list[str]:
@@ -48,8 +50,16 @@ def qemu(board: str, image: str, channel: str | None) -> list[str]:
     return [*COMMANDS[board](IMAGES / board / f"{image}.elf", channel), "-display", "none", "-monitor", "none", "-serial", "stdio", "-name", "ecu,debug-threads=on"]
 
 
+def malformed(board: str, frame: Frame) -> bool:
+    """Does the board's driver count a frame of the bus as one that contradicts itself? See the board's port.h."""
+    dlc = next(length for length in FD_LENGTHS if length >= len(frame.data))
+    return board == "ctucan" and bool(frame.flags & FD) and -(-dlc // 4) != -(-len(frame.data) // 4)
+
+
 def seen(board: str, frame: Frame) -> Frame | None:
-    """A frame of the bus as the board's emulated controller hands it on; None: not at all. See the board's port.h."""
+    """A frame of the bus as the board's emulated controller and its driver hand it on; None: not at all. See the board's port.h."""
+    if malformed(board, frame):
+        return None
     if board != "zynqmp_r5" or not frame.flags & FD:
         return frame
     return Frame(frame.id, frame.flags & ~(FD | BRS), frame.data) if len(frame.data) <= 8 else None
@@ -77,9 +87,9 @@ class Board:
         self.popen.stdin.write(key)
         self.popen.stdin.flush()
 
-    def restart(self) -> None:
-        """A node that begins anew."""
-        self.key("r")
+    def restart(self, key: str = "r") -> None:
+        """A node that begins anew, as the key says."""
+        self.key(key)
         assert self.line() == "ready"
 
     def health(self) -> dict[str, int]:
@@ -96,6 +106,14 @@ class Board:
         end = time.monotonic() + ANSWER_S
         while (told := self.health())["can.received"] < received and time.monotonic() < end:
             time.sleep(0.01)
+        return told
+
+    def quiet(self) -> dict[str, int]:
+        """Every counter, once no more frames come."""
+        before, told = -1, self.health()
+        while told["can.received"] != before:
+            time.sleep(QUIET_S)
+            before, told = told["can.received"], self.health()
         return told
 
     def leave(self) -> int:

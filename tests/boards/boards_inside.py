@@ -3,8 +3,8 @@ and vcan1 exist. Writes OUT/BOARD.json.
 
 The board on vcan0, the Linux node on vcan1 and a node in this process get the same frames of the same emulated plant and injector. Every frame
 the board and the Linux node send must be, byte for byte, the one this process sends, to every closing frame its answer; and in the end every
-counter of every group must be the same. In lockstep, so that nothing depends on how fast this machine is. Then the board's own timer, in real
-time, judged by order.
+counter of every group must be the same. In lockstep, so that nothing depends on how fast this machine is; the board's own timer is for
+tests/node/bus_inside.py.
 """
 
 from __future__ import annotations
@@ -111,40 +111,6 @@ def run(name: str, ticks: int, machine: Board, linux: Process, file: Path) -> di
     }  # fmt: skip
 
 
-def heard(bus: CanLink, drive: Drive, states: set[str], timeout_s: float) -> bool:
-    """Does a verdict come that says so of the bus, all groups alike?"""
-    end = time.monotonic() + timeout_s
-    while (left := end - time.monotonic()) > 0:
-        got = bus.receive(left)
-        if got is not None and got[0].id == drive.verdict_id and set(drive.told(got[0]).bus) == states:
-            return True
-    return False
-
-
-def timed(machine: Board) -> tuple[dict[str, int], list[str]]:
-    """In real time, with the board's own timer: a bus that is silent, then speaks, then falls silent. Judged by order."""
-    drive, missing = Drive(), []
-    with link("vcan0") as bus:
-        machine.key("t")
-        assert machine.line() == "ready"
-        if not heard(bus, drive, {"absent"}, 5.0):
-            missing.append("timed: no verdict on a bus that is silent from the start")
-        good = False
-        for _ in range(60):
-            frames, closing = drive.sample()
-            for frame in [*frames, closing]:
-                bus.send(frame)
-            good = heard(bus, drive, {"good"}, drive.design.model.sample_time_s) or good
-        if not good:
-            missing.append("timed: no verdict with a good bus")
-        if not heard(bus, drive, {"stale"}, 15.0):
-            missing.append("timed: no verdict on a bus that fell silent")
-    told = machine.health()
-    if told["missed"] < 5 or told["steps"] < 50:
-        missing.append(f"timed: {told['missed']} deadlines, {told['steps']} steps")
-    return told, missing
-
-
 def main(name: str, out: Path, ticks: int) -> int:
     """One boot."""
     out.mkdir(parents=True, exist_ok=True)
@@ -152,10 +118,7 @@ def main(name: str, out: Path, ticks: int) -> int:
     began = time.monotonic()
     with board(name) as machine, node("--interface", "vcan1", "--rest", "--lockstep", "--health", file) as linux:
         booted = time.monotonic() - began
-        result = run(name, ticks, machine, linux, file)
-        told, missing = timed(machine)
-        result["differences"] = [*result["differences"], *missing]
-        result |= {"timed": {n: told[n] for n in ("steps", "missed", "outages")}, "boot_s": round(booted, 1), "exit_status": machine.leave()}
+        result = run(name, ticks, machine, linux, file) | {"boot_s": round(booted, 1), "exit_status": machine.leave()}
     (out / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n")
     print(json.dumps(result))
     return int(bool(result["differences"]) or result["exit_status"] != 0)

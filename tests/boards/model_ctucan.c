@@ -1,9 +1,6 @@
 /* Two CTU CAN FD cores on one wire, as their manual has them, as far as hal/ctucan uses them. */
-#include "contract_rig.h"
 #include "ctucan.h"
 #include "model_board.h"
-#include "registers.h"
-#include "rig.h"
 
 enum { DEVICE_ID = 0, MODE = 1, STATUS = 2, COMMAND = 3, INT_STAT = 4, FAULT = 11, RX_STATUS = 26, RX_DATA = 27, TX_STATUS = 28, TX_COMMAND = 29, TX_PRIORITY = 30, TX_BUFFERS = 64 };
 enum { READY = 1, SENT = 4, ABORTED = 7, EMPTY = 8 };
@@ -16,14 +13,10 @@ enum { ACTIVE = 1, PASSIVE = 2, OFF = 4 };
 #define ENABLE (1U << 22)
 
 typedef struct {
+    model_line line;
     uint32_t mode;
     uint32_t resetting;   /* looks at MODE until the reset is over */
-    uint32_t fault;
-    uint32_t events;
-    bool     warning;
     bool     overrun;
-    bool     acknowledged; /* is there anybody who does? */
-    uint32_t aborts;
     uint32_t tx[BUFFERS][STRIDE];
     uint32_t state[BUFFERS];
     uint32_t priority;
@@ -37,8 +30,8 @@ typedef struct {
 static uint32_t device_id = 0x0205CAFDU;
 static uint32_t reset_lasts = 3U;   /* looks at MODE; UINT32_MAX: for ever */
 static core cores[HG_BOARD_CONTROLLERS];
-static hg_ctucan drivers[HG_BOARD_CONTROLLERS];
 
+const model_kind model = {.type = &hg_ctucan, .active = ACTIVE, .passive = PASSIVE, .off = OFF, .error = 0x10U};
 const char *const contract_name = "ctucan, registers modelled";
 const bool contract_classic = false;
 
@@ -53,7 +46,7 @@ static void deliver(core *to, const uint32_t *word)
 {
     const uint32_t count = words_of(word[0]);
 
-    if (((to->mode & ENABLE) == 0U) || (to->fault == OFF)) {
+    if (((to->mode & ENABLE) == 0U) || (to->line.fault == OFF)) {
         return;
     }
     if ((to->held + count) > FIFO) {
@@ -72,7 +65,7 @@ static void transmit(core *self)
 {
     uint32_t best = 0U;
 
-    while ((best < BUFFERS) && ((self->mode & ENABLE) != 0U) && (self->fault != OFF) && self->acknowledged) {
+    while ((best < BUFFERS) && ((self->mode & ENABLE) != 0U) && (self->line.fault != OFF) && self->line.acknowledged) {
         best = BUFFERS;
         for (uint32_t i = 0U; i < BUFFERS; i++) {
             const bool higher = (best == BUFFERS) || (((self->priority >> (4U * i)) & 7U) > ((self->priority >> (4U * best)) & 7U));
@@ -121,11 +114,11 @@ uint32_t hg_register_read(uintptr_t base, uint32_t number)
         self->resetting -= ((self->resetting > 0U) && (self->resetting < UINT32_MAX)) ? 1U : 0U;
         return self->mode | ((self->resetting > 0U) ? 1U : 0U);
     case STATUS:
-        return (self->overrun ? 2U : 0U) | (self->warning ? 0x40U : 0U);
+        return (self->overrun ? 2U : 0U) | (self->line.warning ? 0x40U : 0U);
     case INT_STAT:
-        return self->events;
+        return self->line.events;
     case FAULT:
-        return self->fault << 16;
+        return self->line.fault << 16;
     case RX_STATUS:
         return self->frames << 4;
     case RX_DATA:
@@ -142,10 +135,10 @@ uint32_t hg_register_read(uintptr_t base, uint32_t number)
 static void set_mode(core *self, uint32_t value)
 {
     if ((value & 1U) != 0U) {
-        *self = (core){.resetting = reset_lasts, .fault = OFF, .acknowledged = true, .state = {EMPTY, EMPTY, EMPTY, EMPTY}};
+        *self = (core){.resetting = reset_lasts, .line = {.fault = OFF, .acknowledged = true}, .state = {EMPTY, EMPTY, EMPTY, EMPTY}};
     } else {
         self->mode = value;
-        self->fault = ((value & ENABLE) != 0U) ? ACTIVE : OFF;
+        self->line.fault = ((value & ENABLE) != 0U) ? ACTIVE : OFF;
     }
 }
 
@@ -160,7 +153,6 @@ static void command_buffers(core *self, uint32_t value)
         }
         if (((value & 4U) != 0U) && (self->state[i] == READY)) {
             self->state[i] = ABORTED;
-            self->aborts++;
         }
     }
     transmit(self);
@@ -176,9 +168,9 @@ void hg_register_write(uintptr_t base, uint32_t number, uint32_t value)
         set_mode(self, value);
     } else if (number == COMMAND) {
         self->overrun = self->overrun && ((value & 8U) == 0U);
-        self->fault = (((value & 0x10U) != 0U) && (self->fault == OFF)) ? ACTIVE : self->fault; /* after 128 times 11 recessive bits */
+        self->line.fault = (((value & 0x10U) != 0U) && (self->line.fault == OFF)) ? ACTIVE : self->line.fault; /* after 128 times 11 recessive bits */
     } else if (number == INT_STAT) {
-        self->events &= ~value;
+        self->line.events &= ~value;
     } else if (number == TX_COMMAND) {
         command_buffers(self, value);
     } else if (number == TX_PRIORITY) {
@@ -188,71 +180,31 @@ void hg_register_write(uintptr_t base, uint32_t number, uint32_t value)
     }
 }
 
-/* ---- the board ---- */
+/* ---- the model ---- */
 
-hg_status hg_board_can(uint8_t number, const hg_hal_filter *filters, size_t count, hg_hal *hal)
+model_line *model_line_of(uint8_t number)
 {
-    const hg_ctucan_options options = {
-        .core = MODEL_BASE(number), .now_us = hg_board_now_us, .idle = model_idle, .filters = filters, .filter_count = count,
-        .slots = model_slots[number], .depth = HG_BOARD_DEPTH,
-    };
-    const hg_status status = hg_ctucan_start(&drivers[number], &options);
-    *hal = hg_ctucan_hal(&drivers[number]);
-    return status;
+    return &cores[number].line;
 }
 
-void hg_board_service(uint8_t number)
+uint32_t model_pending(uint8_t number)
 {
-    hg_ctucan_interrupt(&drivers[number]);
+    uint32_t ready = 0U;
+    for (uint32_t i = 0U; i < BUFFERS; i++) {
+        ready += (cores[number].state[i] == READY) ? 1U : 0U;
+    }
+    return ready;
 }
-
-void hg_board_stop(uint8_t number)
-{
-    hg_ctucan_stop(&drivers[number]);
-}
-
-/* ---- the hand on core 0 ---- */
 
 void contract_full(bool full)
 {
     for (uint32_t i = 0U; i < BUFFERS; i++) {
         cores[0].state[i] = full ? READY : ABORTED;
     }
-    cores[0].acknowledged = !full;
-}
-
-void contract_link(bool up)
-{
-    cores[0].fault = up ? ACTIVE : OFF;
-    cores[0].warning = false;
-}
-
-void contract_report(hg_bus_state state)
-{
-    static const uint32_t fault[] = {[HG_BUS_UNKNOWN] = OFF, [HG_BUS_ACTIVE] = ACTIVE, [HG_BUS_WARNING] = ACTIVE, [HG_BUS_PASSIVE] = PASSIVE, [HG_BUS_OFF] = OFF};
-
-    cores[0].fault = fault[state];
-    cores[0].warning = state == HG_BUS_WARNING;
-    cores[0].events |= 0x10U;
+    cores[0].line.acknowledged = !full;
 }
 
 /* ---- what only this controller has ---- */
-
-static int open_both(void **state)
-{
-    hg_hal *const hal = *state;
-
-    hg_board_set_idle(NULL);
-    assert_int_equal(hg_board_can(0U, NULL, 0U, &hal[0]), HG_OK);
-    assert_int_equal(hg_board_can(1U, NULL, 0U, &hal[1]), HG_OK);
-    return 0;
-}
-
-static int nothing(void **state)
-{
-    (void)state;
-    return 0;
-}
 
 static void frames_leave_in_the_order_of_send(void **state)
 {
@@ -260,39 +212,18 @@ static void frames_leave_in_the_order_of_send(void **state)
     hg_can_frame frame = {.length = 1U};
 
     for (uint32_t round = 0U; round < 5U; round++) {
-        cores[0].acknowledged = false;
+        cores[0].line.acknowledged = false;
         for (frame.id = 0U; frame.id < BUFFERS; frame.id++) {
             assert_int_equal(hg_hal_send(&hal[0], &frame), HG_OK);
         }
         assert_int_equal(hg_hal_send(&hal[0], &frame), HG_E_BUSY);
-        cores[0].acknowledged = true;
+        cores[0].line.acknowledged = true;
         transmit(&cores[0]);
         for (uint32_t i = 0U; i < BUFFERS; i++) {
             assert_int_equal(hg_hal_receive(&hal[1], &frame, NULL), HG_OK);
             assert_int_equal(frame.id, i);
         }
     }
-}
-
-static void bus_off_heals_after_a_pause(void **state)
-{
-    const hg_hal *const hal = *state;
-    const hg_can_frame frame = {.id = 5U, .length = 1U};
-    hg_hal_report report;
-
-    cores[0].acknowledged = false;
-    assert_int_equal(hg_hal_send(&hal[0], &frame), HG_OK);
-    cores[0].fault = OFF;
-    cores[0].acknowledged = true;
-    assert_int_equal(hg_hal_wait(&hal[0], hg_hal_now_us(&hal[0]) + (HG_CTUCAN_RESTART_US / 2U)), HG_E_EMPTY);
-    hg_hal_state(&hal[0], &report);
-    assert_int_equal(report.bus, HG_BUS_OFF);
-    assert_int_equal(cores[0].aborts, 1);
-    assert_int_equal(hg_hal_wait(&hal[0], hg_hal_now_us(&hal[0]) + HG_CTUCAN_RESTART_US), HG_E_EMPTY);
-    hg_hal_state(&hal[0], &report);
-    assert_int_equal(report.bus, HG_BUS_ACTIVE);
-    assert_int_equal(hg_hal_send(&hal[0], &frame), HG_OK);
-    assert_int_equal(hg_hal_wait(&hal[1], 0U), HG_OK);
 }
 
 static void an_overrun_of_the_core_is_counted(void **state)
@@ -319,44 +250,25 @@ static void a_frame_shorter_than_its_dlc_is_malformed(void **state)
     assert_int_equal(report.malformed, 1);
 }
 
-static void start_refuses_what_cannot_be(void **state)
+static void start_tells_of_a_core_that_is_not_there_or_stays_in_its_reset(void **state)
 {
-    static const hg_hal_filter bad = {.id = 0x800U};
-    hg_ctucan board;
-    const hg_ctucan_options good = {.core = MODEL_BASE(0), .now_us = hg_board_now_us, .slots = model_slots[0], .depth = HG_BOARD_DEPTH};
-    hg_ctucan_options options[6] = {good, good, good, good, good, good};
+    hg_controller controller;
+    const hg_controller_options good = model_options();
 
     (void)state;
-    options[0].core = 0U;
-    options[1].core += 2U;
-    options[2].now_us = NULL;
-    options[3].slots = NULL;
-    options[4].depth = 3U;
-    options[5].filters = &bad;
-    options[5].filter_count = 1U;
-    for (size_t i = 0U; i < 6U; i++) {
-        assert_int_equal(hg_ctucan_start(&board, &options[i]), HG_E_ARGUMENT);
-    }
-    assert_int_equal(hg_ctucan_start(NULL, &good), HG_E_ARGUMENT);
-    assert_int_equal(hg_ctucan_start(&board, NULL), HG_E_ARGUMENT);
-    assert_int_equal(hg_ctucan_start(&board, &good), HG_OK);
     device_id = 0U;
-    assert_int_equal(hg_ctucan_start(&board, &good), HG_E_BUS);
+    assert_int_equal(hg_controller_start(&controller, &good), HG_E_BUS);
     device_id = 0x0205CAFDU;
     reset_lasts = UINT32_MAX;
-    assert_int_equal(hg_ctucan_start(&board, &good), HG_E_BUS);
+    assert_int_equal(hg_controller_start(&controller, &good), HG_E_BUS);
     reset_lasts = 3U;
 }
 
-int contract_own(void)
+int model_own(void)
 {
-    static hg_hal hal[2];
     const struct CMUnitTest tests[] = {
-        {"start_refuses_what_cannot_be", start_refuses_what_cannot_be, nothing, nothing, hal},
-        {"frames_leave_in_the_order_of_send", frames_leave_in_the_order_of_send, open_both, nothing, hal},
-        {"bus_off_heals_after_a_pause", bus_off_heals_after_a_pause, open_both, nothing, hal},
-        {"an_overrun_of_the_core_is_counted", an_overrun_of_the_core_is_counted, open_both, nothing, hal},
-        {"a_frame_shorter_than_its_dlc_is_malformed", a_frame_shorter_than_its_dlc_is_malformed, open_both, nothing, hal},
+        MODEL_TEST(start_tells_of_a_core_that_is_not_there_or_stays_in_its_reset), MODEL_TEST(frames_leave_in_the_order_of_send),
+        MODEL_TEST(an_overrun_of_the_core_is_counted), MODEL_TEST(a_frame_shorter_than_its_dlc_is_malformed),
     };
 
     return cmocka_run_group_tests_name("ctucan alone", tests, NULL, NULL);

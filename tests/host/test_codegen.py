@@ -20,6 +20,7 @@ from hullguard.codegen import emit_c, emit_dbc, write_all
 from hullguard.codegen.c import fill, real
 from hullguard.codegen.dbc import short
 from hullguard.codegen.names import LIBRARY
+from hullguard.codegen.uio import emit_uio
 from hullguard.design.bank_types import BankTable
 from hullguard.core.library import library
 from hullguard.core.native import Native
@@ -600,6 +601,9 @@ def test_shipped_files_are_those_of_the_shipped_models(name: str) -> None:
     assert (MODELS / f"{name}.h").read_text(encoding="ascii") == header
     assert (MODELS / f"{name}.c").read_text(encoding="ascii") == source
     assert (MODELS / f"{name}.dbc").read_text(encoding="ascii") == emit_dbc(made)
+    for suffix, text in zip((".h", ".c"), emit_uio(made) if made.uios else (), strict=False):
+        assert (MODELS / f"{name}_uio{suffix}").read_text(encoding="ascii") == text
+        assert max(map(len, text.splitlines())) <= 140 and not re.search(r"[ \t]$", text, re.MULTILINE) and made.model.sha256 in text
 
 
 def test_a_model_called_like_a_header_of_the_library_is_refused(designs: dict[str, Design]) -> None:

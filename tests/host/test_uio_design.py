@@ -142,8 +142,10 @@ def test_random_plants() -> None:
         V = observable_part(observer_A1(p), p.C)
         fixed = np.linalg.eigvals(complement(V).T @ observer_A1(p) @ complement(V)) if V.shape[1] < len(p.A) else np.zeros(0)
         # The zeros of the pencil are the modes that no gain moves, found by two routes.
-        assert len(zeros) == len(fixed)
-        assert all(np.abs(fixed - z.value).min() < 1e-5 * (1 + abs(z.value)) for z in zeros)
+        # Far ones, nearly at infinity, are rounding by either route.
+        near = [z for z in zeros if abs(z.value) < 1e3]
+        assert len(near) == np.sum(np.abs(fixed) < 1e3)
+        assert all(np.abs(fixed - z.value).min() < 1e-5 * (1 + abs(z.value)) for z in near)
         assert len(zeros) >= hidden
         for z in zeros:
             assert np.abs((p.A - z.value * np.eye(len(p.A))) @ z.state + p.G @ z.input).max() < 1e-6 * (1 + np.abs(z.input).max())
@@ -363,3 +365,27 @@ def test_a_model_that_asks_for_the_impossible_is_refused_with_the_reason() -> No
         design(load_model("suspension", hidden))
     with pytest.raises(InputError, match=r"detector\.uio\[0\]: .*rank CG is 1"):
         design(load_model("suspension", {"detector.uio.0.outputs": ["deflection1_m", "wheel1_mps"]}))
+
+
+def test_leaky_integration_is_as_wrong_as_its_bound_says() -> None:
+    """From -height to +height after long rest reaches it, offset against the step; nothing exceeds it."""
+    leak, height, offset, period = 0.5, 0.05, 0.01, 1e-3
+    bound = uio_sensors.leaky_integration_error(leak, height, offset)
+    t = np.arange(0.0, 60.0, period)
+    rng = np.random.default_rng(SEED)
+    wave = sum(np.sin(2 * np.pi * f * t + p) for f, p in zip(rng.uniform(0.02, 3.0, 9), rng.uniform(0, 6, 9), strict=True))
+    worst = -np.ones_like(t)
+    worst[(t > 39.9) & (t <= 40.0)] = np.linspace(-1, 1, int(np.sum((t > 39.9) & (t <= 40.0))))
+    worst[t > 40.0] = 1.0
+    reached = []
+    for course in (worst, np.asarray(wave) / np.abs(wave).max()):
+        velocity = np.gradient(height * course, period)
+        found, v = np.zeros_like(t), velocity[0]
+        for k in range(len(t) - 1):
+            v = np.exp(-leak * period) * v + (velocity[k + 1] - velocity[k]) - offset * period
+            found[k + 1] = v
+        wrong = np.abs(velocity - found)[t > 30.0].max()
+        assert wrong <= bound * 1.001
+        reached.append(wrong)
+    assert reached[0] >= 0.9 * bound
+    assert uio_sensors.leaky_integration_error(0.03, 0.05, 6e-5) == pytest.approx(0.005)  # the noise of suspension.toml

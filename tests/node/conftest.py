@@ -15,6 +15,10 @@ TICKS = {"steady": (6000, 0), "dropped": (500, 100)}
 _started: list[tuple[subprocess.Popen[str], Path]] = []
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "quick: of bus_inside.py, what `make test` runs on boards")
+
+
 def pytest_report_header() -> str:
     return f"tests/node: HULLGUARD_SEED={SEED}"
 

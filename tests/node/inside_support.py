@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from hullguard.bus.link import CanLink, opened
 from hullguard.core.library import library
@@ -57,14 +57,22 @@ class Process:
         self.lines, self.status = out.splitlines(), self.popen.returncode
 
 
+def _first_line(popen: subprocess.Popen[str]) -> str:
+    """Read past the stream's buffer, byte by byte: communicate() reads past it as well, and what was in it would be lost."""
+    assert popen.stdout is not None
+    line = b""
+    while not line.endswith(b"\n") and (byte := os.read(popen.stdout.fileno(), 1)):
+        line += byte
+    return line.decode()
+
+
 @contextlib.contextmanager
 def process(*command: object) -> Iterator[Process]:
     """A program that prints 'ready' first; stopped at the end unless it has been before."""
     popen = subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment())
     made = Process(popen)
     try:
-        assert popen.stdout is not None
-        first = popen.stdout.readline()
+        first = _first_line(popen)
         if first != "ready\n":
             made.wait()
             raise AssertionError(f"{command}: said {first!r}, status {made.status}: {made.err}")
@@ -91,12 +99,22 @@ def reachable(native: Native, frame: Frame) -> bool:
 
 
 class Drive:
-    """Frames of an emulated plant, and a node in this process that gets what the one on the bus gets."""
+    """Frames of an emulated plant, and a node in this process that gets what the one on the bus gets; `seen` is what the latter's controller makes
+    of a frame, None for nothing."""
 
-    def __init__(self, model: str = "platoon", scenario: str = "manoeuvres", faults: tuple[str, ...] = (), seed: int = SEED) -> None:
+    def __init__(
+        self,
+        model: str = "platoon",
+        scenario: str = "manoeuvres",
+        faults: tuple[str, ...] = (),
+        seed: int = SEED,
+        start: int = REST,
+        seen: Callable[[Frame], Frame | None] = lambda frame: frame,
+    ) -> None:
         self.design, self.native = ready(model)
         self.source = Plant(self.native, self.design, self.design.model.scenario(scenario).reference, [parse_fault(f) for f in faults], seed)
-        self.sender, self.shadow, self.k = Sender(self.native), Node(self.native, REST), 0
+        self.sender, self.shadow, self.k = Sender(self.native), Node(self.native, start), 0
+        self.seen = seen
         closing = self.native.tables.closing
         self.order = [g for g in range(len(self.native.tables.groups)) if g != closing] + [closing]
 
@@ -110,15 +128,28 @@ class Drive:
 
     def take(self, frames: list[Frame], lockstep: bool = True) -> tuple[list[Verdict], list[Frame]]:
         """What the node makes of frames: the verdict of each step, and what it sends."""
-        verdicts, sent = [], []
+        verdicts: list[Verdict] = []
+        sent: list[Frame] = []
         for frame in frames:
-            if not reachable(self.native, frame):
+            taken = self.seen(frame)
+            if taken is None or not reachable(self.native, taken):
                 continue
-            self.shadow.receive(frame)
-            while (verdict := self.shadow.step()) is not None:
-                verdicts.append(verdict)
-                sent += self.shadow.report(lockstep)
+            self.shadow.receive(taken)
+            self._step(lockstep, verdicts, sent)
         return verdicts, sent
+
+    def overdue(self) -> tuple[list[Verdict], list[Frame]]:
+        """What the node makes of a closing frame that has not come in time."""
+        verdicts: list[Verdict] = []
+        sent: list[Frame] = []
+        self.shadow.overdue()
+        self._step(False, verdicts, sent)
+        return verdicts, sent
+
+    def _step(self, lockstep: bool, verdicts: list[Verdict], sent: list[Frame]) -> None:
+        while (verdict := self.shadow.step()) is not None:
+            verdicts.append(verdict)
+            sent += self.shadow.report(lockstep)
 
     def told(self, frame: Frame) -> Verdict:
         verdict = read_verdict(self.native, frame)
@@ -185,17 +216,6 @@ def recorded(path: Path, *command: object, filters: int = 1) -> Iterator[None]:
         finally:
             popen.send_signal(signal.SIGINT)
             popen.wait(WAIT_S)
-
-
-def health(process_: Process) -> dict[str, dict[str, Any]]:
-    """Last status line: group -> bus, good, lost, refused."""
-    rows = {}
-    for word in process_.lines[-1].split():
-        name, _, rest = word.partition("=")
-        if "/good:" in rest:
-            bus, *counts = rest.split("/")
-            rows[name] = {"bus": bus} | {c.split(":")[0]: int(c.split(":")[1]) for c in counts}
-    return rows
 
 
 def folder(path: Path, name: str) -> Path:

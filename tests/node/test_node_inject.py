@@ -1,4 +1,4 @@
-"""The injector between two vcan interfaces, and as a tap on one; what needs a bus is in inject_inside.py."""
+"""The injector as a tap on a bus; what needs a bus is in inject_inside.py."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ from node_support import run_inside
 
 
 def test_injection_on_vcan(tmp_path: Path) -> None:
-    run_inside("inject_inside.py", out=tmp_path, interfaces=2)
+    run_inside("inject_inside.py", out=tmp_path)

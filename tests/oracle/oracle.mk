@@ -7,12 +7,13 @@ ORACLE_BUILD := $(BUILD)/oracle
 ORACLE_EIGEN ?= /usr/include/eigen3
 ORACLE_CXX   := $(CXX) -std=c++17 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
                 -isystem $(ORACLE_EIGEN) -Ifirmware/include $(DEPEND)
-ORACLE_PROGRAMS := $(FLOATS:%=$(ORACLE_BUILD)/test_oracle_%) $(ORACLE_BUILD)/oracle_run
-OBJECTS += $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o $(FLOATS:%=$(ORACLE_BUILD)/test_oracle_%.o)
+ORACLE_PROGRAMS := $(FLOATS:%=$(ORACLE_BUILD)/test_oracle_%) $(FLOATS:%=$(ORACLE_BUILD)/test_fusion_%) $(ORACLE_BUILD)/oracle_run
+OBJECTS += $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o $(FLOATS:%=$(ORACLE_BUILD)/test_oracle_%.o) $(FLOATS:%=$(ORACLE_BUILD)/test_fusion_%.o)
 
 .PHONY: oracle
 oracle: $(ORACLE_PROGRAMS) ## the library against an independent implementation in double precision (random; HULLGUARD_SEED=n repeats)
-	$(Q)set -e; for real in $(FLOATS); do ASAN_OPTIONS=detect_leaks=0 timeout 300 $(ORACLE_BUILD)/test_oracle_$$real; done
+	$(Q)set -e; for real in $(FLOATS); do ASAN_OPTIONS=detect_leaks=0 timeout 300 $(ORACLE_BUILD)/test_oracle_$$real; \
+	  ASAN_OPTIONS=detect_leaks=0 timeout 300 $(ORACLE_BUILD)/test_fusion_$$real; done
 	$(Q)sh $(ORACLE)/test_oracle_run.sh $(ORACLE_BUILD)/oracle_run $(ORACLE)
 TEST_PARTS += oracle
 
@@ -28,6 +29,11 @@ $(ORACLE_BUILD)/test_oracle_$(1).o: $(ORACLE)/test_oracle.cpp $(ORACLE)/oracle.m
 	@mkdir -p $$(@D)
 	$$(Q)$$(ORACLE_CXX) $(REAL_FLAG_$(1)) -c $$< -o $$@
 $(ORACLE_BUILD)/test_oracle_$(1): $(ORACLE_BUILD)/test_oracle_$(1).o $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/$(1)/libhullguard.a
+	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
+$(ORACLE_BUILD)/test_fusion_$(1).o: $(ORACLE)/test_fusion.cpp $(ORACLE)/oracle.mk
+	@mkdir -p $$(@D)
+	$$(Q)$$(ORACLE_CXX) $(REAL_FLAG_$(1)) -c $$< -o $$@
+$(ORACLE_BUILD)/test_fusion_$(1): $(ORACLE_BUILD)/test_fusion_$(1).o $(ORACLE_BUILD)/$(1)/libhullguard.a
 	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
 endef
 $(foreach r,$(FLOATS),$(eval $(call oracle_variant,$(r))))

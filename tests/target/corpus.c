@@ -2,9 +2,11 @@
  *  The nodes of the shipped models over a fixed drive: random walks, standstill, a link that loses, damages, doubles and delays frames, a clock
  *  that closes samples, outages. A hash is printed over every verdict, every report and the bits of every value, radius, r and J. float32
  *  arithmetic is exact to the bit by IEEE 754 wherever no product is fused into a sum and no subnormal number is flushed to zero, so that
- *  every processor must print the same; to have some of those, the residual generators run once more on tiny signals. No C library is needed. */
+ *  every processor must print the same; to have some of those, the residual generators run once more on tiny signals. Then the fusion filter
+ *  (corpus_fusion.c). No C library is needed. */
 
 #include "console.h"
+#include "corpus_fusion.h"
 #include "openacc.h"
 #include "platoon.h"
 #include "platoon_bank.h"
@@ -308,6 +310,10 @@ int main(void)
     for (size_t i = 0U; i < (sizeof(subjects) / sizeof(subjects[0])); i++) {
         good = run(&subjects[i]) && good;
     }
+    const uint64_t fusion = corpus_fusion(SAMPLES);
+    good = good && (fusion != 0U);
+    print_hex("fusion ", fusion, 16U);
+    print("\n");
     print(good ? "corpus ends\n" : "corpus fails\n");
     return good ? 0 : 1;
 }

@@ -11,7 +11,7 @@ UNIT_TARGETS := $(foreach t,$(RUN_TARGETS),$(if $(filter-out none,$(LIBC_$(t))),
 
 # Unit tests that need more than the 16 KB of RAM of the microbit: what was compiled for Cortex-M0 runs on the board of Cortex-M3, whose
 # instructions contain M0's. No test is left out on any target.
-UNIT_LARGE_cortex_m0 := test_adversary test_bank test_hold test_linalg test_mismatch test_node test_ring test_robust test_zonotope
+UNIT_LARGE_cortex_m0 := test_adversary test_bank test_fusion test_hold test_linalg test_mismatch test_node test_ring test_robust test_zonotope
 UNIT_BOARD_cortex_m0 := cortex_m3
 
 # These take 7 to 60 s on each target. `make test` runs the others, on the smallest core, on one with an FPU and on the big-endian one, beside
@@ -20,7 +20,7 @@ UNIT_SLOW  := test_adversary test_e2e_errors test_robust test_zonotope
 UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TESTS)/$(t)/%.ok,$(filter-out $(UNIT_SLOW),$(UNIT_TESTS))))
 
 # What a program is made of beside its test: by the C library of its target.
-CORPUS_SRC        := tests/target/corpus.c $(MODEL_SRC)
+CORPUS_SRC        := tests/target/corpus.c tests/target/corpus_fusion.c $(MODEL_SRC)
 NODE_SRC          := firmware/apps/detector_main.c tests/target/board_script.c firmware/models/platoon.c
 CONSOLE_none      := tests/target/console_semihosting.c hal/semihosting/semihosting.c
 CONSOLE_newlib    := $(CONSOLE_none)

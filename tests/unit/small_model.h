@@ -14,8 +14,8 @@
 #define SM_GENERATORS 2U
 #define SM_TAPS 5U
 #define SM_HISTORY (SM_TAPS + 1U)
-#define SM_CODES (2U * SM_SIGNALS)
-#define SM_REALS ((3U * SM_SIGNALS) + (2U * 2U) + (SM_SIGNALS * SM_HISTORY) + 4U + 3U + 2U)
+#define SM_CODES (3U * SM_SIGNALS)
+#define SM_REALS ((2U * SM_SIGNALS) + (2U * 2U) + (SM_SIGNALS * SM_HISTORY) + 4U + 3U + 2U)
 #define SM_RESOLUTION 0.015625
 #define SM_HALF 0.0078125
 #define SM_SPAN 94.0
@@ -58,8 +58,8 @@ static const hg_residual_config sm_residual[SM_GENERATORS] = {
      .output = {1U, 1U, 0, sm_minus_one}, .direct = {1U, 1U, 0, sm_one}}};
 
 static const uint8_t sm_taps[] = {SM_TAPS, SM_TAPS};
-static const hg_real sm_weight_0[SM_TAPS * 2U] = {[0] = R(1), [SM_TAPS] = R(1)};
-static const hg_real sm_weight_1[SM_TAPS] = {R(1), R(1)};
+static const hg_real sm_weight_0[(SM_TAPS + 1U) * 2U] = {[0] = R(1), [SM_TAPS + 1U] = R(1)};
+static const hg_real sm_weight_1[SM_TAPS + 1U] = {R(1), R(1)};
 static const hg_real sm_start_0[] = {R(64)};
 static const hg_real sm_bias_0[] = {R(0.0625)};
 static const hg_real sm_start_1[] = {R(64)};
@@ -67,10 +67,10 @@ static const hg_real sm_bias_1[] = {R(0.25)};
 static const hg_hull_config sm_hull[SM_GENERATORS] = {
     {.residuals = 1U, .width = 2U, .signal = sm_signals_0, .taps = sm_taps, .weight = sm_weight_0, .settle = 1U, .rest = sm_bias_0,
      .rest_left = sm_none, .moving = sm_start_0, .moving_left = sm_none, .bias = sm_bias_0, .ready_rest = 0U, .ready_moving = 3U,
-     .decay = sm_none, .tail = sm_none},
+     .decay = sm_none},
     {.residuals = 1U, .width = 1U, .signal = sm_signals_1, .taps = sm_taps, .weight = sm_weight_1, .settle = 1U, .rest = sm_start_1,
      .rest_left = sm_none, .moving = sm_start_1, .moving_left = sm_none, .bias = sm_bias_1, .ready_rest = 0U, .ready_moving = 2U,
-     .decay = sm_none, .tail = sm_none}};
+     .decay = sm_none}};
 
 static const uint8_t sm_feeds[] = {0x3U, 0x1U};
 static const uint32_t sm_faults[] = {0x5U, 0x2U};

@@ -121,6 +121,10 @@ static void contradicting_tables_are_refused(void **state)
     refuse(&d, HG_E_CONFIG);
 }
 
+/* Of a group that speaks less often than the small model's. */
+static const hg_real long_slew[SM_TAPS + 2U + 3U] = {SM_SLEW(1), SM_SLEW(2), SM_SLEW(3), SM_SLEW(4), SM_SLEW(5), SM_SLEW(6), SM_SLEW(7),
+                                                     SM_SLEW(8), SM_SLEW(9), SM_SLEW(10)};
+
 static void contradicting_groups_are_refused(void **state)
 {
     (void)state;
@@ -137,21 +141,25 @@ static void contradicting_groups_are_refused(void **state)
     hold[1].margin = 255U;
     refuse(&c, HG_E_CONFIG);
     hg_trigger_config slow = sm_trigger_b;
-    slow.interval_max = SM_TAPS + 1U; /* a rewind would reach behind the taps */
+    slow.interval_max = SM_TAPS + 2U; /* a rewind would reach behind the taps */
     hold[1] = sm_hold[1];
     hold[1].trigger = &slow;
+    hold[1].slew = long_slew;
     refuse(&c, HG_E_CONFIG);
+    slow.interval_max = SM_TAPS + 1U;
+    rig r;
+    begin_with(&r, &c, HG_START_REST);
 }
 
-/* A frame can be found lost as long as its group may be silent; a signal without events needs no more than one tap. */
+/* A frame can be found lost as long as its group may be silent; a signal without events needs no tap. */
 static void a_rewind_ends_within_a_signals_own_taps(void **state)
 {
     (void)state;
     hg_hull_config hull[SM_GENERATORS] = {sm_hull[0], sm_hull[1]};
     hg_detector_config c = sm_detector;
     c.hull = hull;
-    const uint8_t enough[] = {4U, 1U};
-    const uint8_t few[] = {3U, 1U};
+    const uint8_t enough[] = {3U, 0U};
+    const uint8_t few[] = {2U, 0U};
     rig r;
     hull[0].taps = enough;
     begin_with(&r, &c, HG_START_REST);
@@ -166,8 +174,9 @@ static void a_rewind_ends_within_a_signals_own_taps(void **state)
     hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
     slow.interval_max = 2U;
     hold[1].trigger = &slow;
+    hold[1].slew = long_slew;
     c.hold = hold;
-    hull[0].taps = enough; /* one tap is not enough for two samples */
+    hull[0].taps = enough; /* a sample may be rewritten, but it would be in the tail */
     refuse(&c, HG_E_CONFIG);
     hull[0].taps = NULL;
     refuse(&c, HG_E_CONFIG);
@@ -387,7 +396,6 @@ static void a_threshold_with_modes_stands_beside_the_others(void **state)
     hg_detector_config c = sm_detector;
     c.hull = hull;
     assert_count(SM_REALS + 2U, hg_detector_reals(&c));
-    refuse(&c, HG_E_SIZE);
     rig r;
     rig plain;
     hg_real real[SM_REALS + 3U];
@@ -395,6 +403,8 @@ static void a_threshold_with_modes_stands_beside_the_others(void **state)
     begin(&plain, HG_START_REST);
     hg_detector_memory memory = sm_memory(&r.storage);
     memory.real = real;
+    memory.reals = SM_REALS + 1U;
+    assert_status(HG_E_SIZE, hg_detector_start(&r.self, &c, &memory, HG_START_REST));
     memory.reals = SM_REALS + 2U;
     assert_status(HG_OK, hg_detector_start(&r.self, &c, &memory, HG_START_REST));
     double mode[2] = {8.0, 16.0};

@@ -21,7 +21,7 @@
 #define HISTORY 6U
 #define TAPS 5U
 #define SETTLE 6U
-#define REALS ((3U * WIDTH) + (2U * 3U) + (WIDTH * HISTORY) + (SM_SIGNALS * WINDOW) + 4U + 3U + 7U + 2U)
+#define REALS ((2U * WIDTH) + (2U * 3U) + (WIDTH * HISTORY) + (SM_SIGNALS * WINDOW) + 4U + 3U + 7U + 2U)
 #define SUMS (2U * CERTIFICATES)
 #define TINY 0.000244140625
 #define DRIFT (0.0078125 + 0.03125 + 0.015625 + (0.25 * SM_HALF)) /* of the prediction in a sample */
@@ -58,14 +58,14 @@ static const hg_residual_config residual[] = {
     {.order = 1U, .residuals = 1U, .width = 1U, .signal = sm_signals_1, .state = {1U, 1U, 0, zeros}, .input = {1U, 1U, 0, sm_one},
      .output = {1U, 1U, 0, sm_minus_one}, .direct = {1U, 1U, 0, sm_one}}};
 static const uint8_t taps[] = {TAPS, TAPS, TAPS};
-static const hg_real weight_0[TAPS * 3U] = {[0] = R(1), [1] = R(1), [TAPS + 1U] = R(0.25), [(2U * TAPS) + 1U] = R(1)};
+static const hg_real weight_0[(TAPS + 1U) * 3U] = {[0] = R(1), [1] = R(1), [TAPS + 2U] = R(0.25), [(2U * TAPS) + 3U] = R(1)};
 static const hg_real bias_0[] = {R(TINY)};
 static const hg_hull_config hull[] = {
     {.residuals = 1U, .width = 3U, .signal = wide_0, .taps = taps, .weight = weight_0, .settle = 1U, .rest = sm_start_0, .rest_left = zeros,
-     .moving = sm_start_0, .moving_left = zeros, .bias = bias_0, .ready_rest = 0U, .ready_moving = 2U, .decay = zeros, .tail = zeros},
+     .moving = sm_start_0, .moving_left = zeros, .bias = bias_0, .ready_rest = 0U, .ready_moving = 2U, .decay = zeros},
     {.residuals = 1U, .width = 1U, .signal = sm_signals_1, .taps = taps, .weight = sm_weight_1, .settle = 1U, .rest = sm_start_1,
      .rest_left = zeros, .moving = sm_start_1, .moving_left = zeros, .bias = sm_bias_1, .ready_rest = 0U, .ready_moving = 2U,
-     .decay = zeros, .tail = zeros}};
+     .decay = zeros}};
 
 static const uint8_t bank_place[] = {0U, 2U};
 static const uint8_t bank_extra[] = {5U};
@@ -92,7 +92,7 @@ static const hg_detector_config alone = {
     .mismatch = &mismatch, .generators = 0U, .residual = NULL, .hull = NULL, .banks = 1U, .bank = bank_alone,
     .decision = {.generators = 1U, .feeds = &feeds[2], .faults = &faults[2], .up = 1U, .down = 3U, .latch = false},
     .history = WINDOW, .window = WINDOW, .residuals = 1U, .codes = SM_CODES,
-    .reals = (3U * 4U) + 2U + (4U * WINDOW) + (SM_SIGNALS * WINDOW), .sums = SUMS};
+    .reals = (2U * 4U) + 2U + (4U * WINDOW) + (SM_SIGNALS * WINDOW), .sums = SUMS};
 
 typedef struct {
     hg_hold     hold[SM_GROUPS];
@@ -731,15 +731,22 @@ static void a_value_that_the_mismatch_cannot_bound_spoils_no_other_radius(void *
     assert_real(SM_SPAN, past(&r, 1U, 1U));
 }
 
-static void a_radius_that_is_not_finite_is_kept_as_the_largest_number(void **state)
+static void the_largest_number_is_a_radius_and_none_that_is_not_finite(void **state)
 {
     (void)state;
-    const hg_real bad_span[] = {REAL_NAN, R(SM_SPAN)};
+    hg_real span[] = {R(0), R(SM_SPAN)};
     hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
-    hold[0].span = bad_span;
+    hold[0].span = span;
     hg_detector_config c = usual;
     c.hold = hold;
     rig r;
+    const hg_real bad[] = {REAL_NAN, REAL_INF, R(-1)};
+    for (size_t i = 0U; i < COUNT(bad); i++) {
+        span[0] = bad[i];
+        const hg_detector_memory memory = memory_of(&r.storage, &c);
+        assert_status(HG_E_CONFIG, hg_detector_start(&r.self, &c, &memory, HG_START_REST));
+    }
+    span[0] = HG_REAL_MAX;
     begin(&r, &c);
     for (int k = 0; k < 4; k++) {
         (void)sample(&r, 0, 0, 0);
@@ -962,7 +969,7 @@ int main(void)
         cmocka_unit_test(restart_empties_windows_and_ends_predictions),
         cmocka_unit_test(a_number_that_is_not_finite_empties_the_windows),
         cmocka_unit_test(a_value_that_the_mismatch_cannot_bound_spoils_no_other_radius),
-        cmocka_unit_test(a_radius_that_is_not_finite_is_kept_as_the_largest_number),
+        cmocka_unit_test(the_largest_number_is_a_radius_and_none_that_is_not_finite),
         cmocka_unit_test(a_lost_frame_takes_a_banks_alarm_back),
         cmocka_unit_test(candidates_are_narrowed_by_the_bank_for_the_episode),
         cmocka_unit_test(a_rewind_longer_than_the_ring_ends_with_it),

@@ -9,7 +9,7 @@
 
 #define COLUMNS 8U
 #define ROOM(width) (HG_ZONOTOPE_REALS(1U, COLUMNS, (width)))
-#define REALS (SM_REALS - (2U * HG_HULL_REALS(1U)) + ROOM(2U) + ROOM(1U))
+#define REALS (SM_REALS - (2U * HG_HULL_REALS(1U, 0U)) + ROOM(2U) + ROOM(1U))
 
 static const uint8_t one_row[] = {1U};
 static const hg_real zero[] = {R(0), R(0)};

@@ -179,43 +179,55 @@ static void alternate_has_identifiers_that_let_errors_of_one_or_two_bits_pass(vo
     assert_count(202, most);
 }
 
+/* A profile with a list of data identifiers, and how many errors of one, two and three bits it lets pass, for every counter. */
+typedef struct {
+    hg_e2e_profile profile;
+    const uint8_t *list;
+    unsigned       passing[DEEPEST][COUNTERS];
+} list_case;
+
+static void expect_lists(const list_case *cases, size_t count, unsigned run)
+{
+    uint32_t random = seed_of_run(run);
+    for (size_t i = 0U; i < count; i++) {
+        const hg_e2e_config config = h2f(cases[i].profile, cases[i].list);
+        expect(&config, cases[i].passing[0], cases[i].passing[1], cases[i].passing[2], &random);
+    }
+}
+
 static void equal_entries_of_a_list_let_nothing_pass(void **state)
 {
     (void)state;
-    uint32_t random = seed_of_run(15U);
-    const hg_e2e_config p02 = h2f(HG_E2E_P02, all_same);
-    const hg_e2e_config p22 = h2f(HG_E2E_P22, all_same);
-    expect(&p02, NULL, NULL, NULL, &random);
-    expect(&p22, NULL, NULL, NULL, &random);
+    static const list_case cases[] = {{.profile = HG_E2E_P02, .list = all_same}, {.profile = HG_E2E_P22, .list = all_same}};
+    expect_lists(cases, COUNT(cases), 15U);
 }
 
 /* 0 .. 15 is linear in the counter: the same for every counter. Any other list is worse or better by chance. */
 static void other_lists_let_errors_pass(void **state)
 {
     (void)state;
-    static const unsigned three_zero[COUNTERS] = {48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U};
-    static const unsigned two_one[COUNTERS] = {1U, 2U, 0U, 2U, 1U, 1U, 1U, 3U, 1U, 2U, 0U, 1U, 1U, 2U, 0U, 2U};
-    static const unsigned three_one[COUNTERS] = {38U, 28U, 54U, 28U, 38U, 42U, 39U, 14U, 38U, 28U, 53U, 40U, 38U, 28U, 54U, 28U};
-    uint32_t random = seed_of_run(16U);
-    const hg_e2e_config zero = h2f(HG_E2E_P02, from_zero);
-    const hg_e2e_config one = h2f(HG_E2E_P22, from_one);
-    expect(&zero, NULL, NULL, three_zero, &random);
-    expect(&one, NULL, two_one, three_one, &random);
+    static const list_case cases[] = {
+        {HG_E2E_P02, from_zero,
+         {{0U}, {0U}, {48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U, 48U}}},
+        {HG_E2E_P22, from_one,
+         {{0U}, {1U, 2U, 0U, 2U, 1U, 1U, 1U, 3U, 1U, 2U, 0U, 1U, 1U, 2U, 0U, 2U},
+          {38U, 28U, 54U, 28U, 38U, 42U, 39U, 14U, 38U, 28U, 53U, 40U, 38U, 28U, 54U, 28U}}},
+    };
+    expect_lists(cases, COUNT(cases), 16U);
 }
 
 static void random_lists_let_errors_of_one_and_two_bits_pass(void **state)
 {
     (void)state;
-    static const unsigned two_a[COUNTERS] = {1U, 0U, 3U, 3U, 0U, 0U, 3U, 2U, 1U, 0U, 0U, 1U, 2U, 2U, 1U, 1U};
-    static const unsigned three_a[COUNTERS] = {27U, 41U, 16U, 12U, 32U, 29U, 2U, 27U, 29U, 44U, 46U, 30U, 32U, 17U, 47U, 43U};
-    static const unsigned one_b[COUNTERS] = {0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 1U, 1U, 0U, 0U, 0U, 0U};
-    static const unsigned two_b[COUNTERS] = {2U, 1U, 1U, 1U, 3U, 2U, 0U, 1U, 1U, 0U, 2U, 0U, 1U, 1U, 2U, 2U};
-    static const unsigned three_b[COUNTERS] = {32U, 44U, 47U, 43U, 19U, 31U, 48U, 44U, 51U, 46U, 14U, 23U, 48U, 46U, 17U, 27U};
-    uint32_t random = seed_of_run(17U);
-    const hg_e2e_config a = h2f(HG_E2E_P02, pseudo_random[0]);
-    const hg_e2e_config b = h2f(HG_E2E_P02, pseudo_random[1]);
-    expect(&a, NULL, two_a, three_a, &random);
-    expect(&b, one_b, two_b, three_b, &random);
+    static const list_case cases[] = {
+        {HG_E2E_P02, pseudo_random[0],
+         {{0U}, {1U, 0U, 3U, 3U, 0U, 0U, 3U, 2U, 1U, 0U, 0U, 1U, 2U, 2U, 1U, 1U},
+          {27U, 41U, 16U, 12U, 32U, 29U, 2U, 27U, 29U, 44U, 46U, 30U, 32U, 17U, 47U, 43U}}},
+        {HG_E2E_P02, pseudo_random[1],
+         {{0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 0U, 1U, 1U, 0U, 0U, 0U, 0U}, {2U, 1U, 1U, 1U, 3U, 2U, 0U, 1U, 1U, 0U, 2U, 0U, 1U, 1U, 2U, 2U},
+          {32U, 44U, 47U, 43U, 19U, 31U, 48U, 44U, 51U, 46U, 14U, 23U, 48U, 46U, 17U, 27U}}},
+    };
+    expect_lists(cases, COUNT(cases), 17U);
 }
 
 static void p05_lets_nothing_pass(void **state)

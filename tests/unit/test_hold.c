@@ -56,7 +56,7 @@ static hg_real slew(uint32_t j, size_t g)
 
 typedef struct {
     hg_hold hold;
-    int32_t codes[(2U * WIDTH) + 1U];
+    int32_t codes[(3U * WIDTH) + 1U];
     hg_real value[WIDTH + 1U];
     hg_real radius[WIDTH + 1U];
     uint8_t rewind;
@@ -65,7 +65,7 @@ typedef struct {
 static void begin(rig *r)
 {
     (void)memset(r, 0x5A, sizeof(*r));
-    arm_codes(r->codes, (2U * WIDTH) + 1U);
+    arm_codes(r->codes, (3U * WIDTH) + 1U);
     arm(r->value, WIDTH + 1U);
     arm(r->radius, WIDTH + 1U);
     assert_status(HG_OK, hg_hold_start(&r->hold, &usual, r->codes));
@@ -82,7 +82,7 @@ static void step(rig *r)
     }
     assert_untouched(&r->value[WIDTH], 1U);
     assert_untouched(&r->radius[WIDTH], 1U);
-    assert_codes_untouched(&r->codes[2U * WIDTH], 1U);
+    assert_codes_untouched(&r->codes[3U * WIDTH], 1U);
 }
 
 static void frame(rig *r, int32_t a, int32_t b, bool continues)
@@ -96,8 +96,8 @@ static void start_tells_null_and_bad_tables(void **state)
 {
     (void)state;
     hg_hold self;
-    int32_t codes[2U * WIDTH];
-    arm_codes(codes, 2U * WIDTH);
+    int32_t codes[3U * WIDTH];
+    arm_codes(codes, 3U * WIDTH);
     assert_status(HG_E_ARGUMENT, hg_hold_start(NULL, &usual, codes));
     assert_status(HG_E_ARGUMENT, hg_hold_start(&self, NULL, codes));
     assert_status(HG_E_ARGUMENT, hg_hold_start(&self, &usual, NULL));
@@ -120,7 +120,7 @@ static void start_tells_null_and_bad_tables(void **state)
     assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
     c = usual, c.middle = NULL;
     assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
-    assert_codes_untouched(codes, 2U * WIDTH);
+    assert_codes_untouched(codes, 3U * WIDTH);
     c = usual, c.margin = (uint8_t)(254U - INTERVAL);
     assert_status(HG_OK, hg_hold_start(&self, &c, codes));
 }
@@ -212,7 +212,7 @@ static void while_the_level_is_unknown_the_widest_counts(void **state)
     const uint8_t longest[3] = {2U, 0U, 2U};
     const double widest[3] = {4.0, 2.0, 1.0};
     hg_hold self;
-    int32_t codes[2];
+    int32_t codes[HG_HOLD_CODES(1U)];
     hg_real value;
     hg_real radius;
     uint8_t rewind;
@@ -258,7 +258,7 @@ static void a_second_frame_of_one_sample_is_refused(void **state)
     const int32_t second[WIDTH] = {3, 4};
     assert_status(HG_OK, hg_hold_receive(&r.hold, first, true));
     const hg_hold before = r.hold;
-    int32_t codes[2U * WIDTH];
+    int32_t codes[3U * WIDTH];
     (void)memcpy(codes, r.codes, sizeof(codes));
     assert_status(HG_E_REPEATED, hg_hold_receive(&r.hold, second, true));
     assert_memory_equal(&before, &r.hold, sizeof(before));

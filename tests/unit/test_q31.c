@@ -309,8 +309,8 @@ static void a_generator_is_its_equations_with_one_rounding_a_sum(void **state)
 typedef struct {
     uint8_t signal[IN];
     uint8_t taps[IN];
-    size_t  all; /* taps together */
-    hg_real weight[OUT * IN * LENGTH]; /* by residual, signal and lag */
+    size_t  all; /* numbers of one residual */
+    hg_real weight[OUT * IN * LENGTH]; /* by residual, signal and lag; behind a signal's lags its tail */
     hg_real laid_out[OUT * IN * LENGTH];
     hg_real rest[SETTLE * OUT];
     hg_real moving[SETTLE * OUT];
@@ -318,7 +318,6 @@ typedef struct {
     hg_real moving_left[OUT];
     hg_real bias[OUT];
     hg_real decay[OUT];
-    hg_real tail[OUT * IN];
 } tables;
 
 static void draw_positive(uint32_t *random, hg_real *x, size_t n, hg_real most)
@@ -333,12 +332,11 @@ static void draw_tables(uint32_t *random, tables *t)
     t->all = 0U;
     for (size_t g = 0U; g < IN; g++) {
         t->signal[g] = (uint8_t)draw_between(random, 0, (int32_t)IN - 1);
-        t->taps[g] = (uint8_t)draw_between(random, 1, (int32_t)LENGTH - 1);
-        t->all += t->taps[g];
+        t->taps[g] = (uint8_t)draw_between(random, 0, (int32_t)LENGTH - 1);
+        t->all += t->taps[g] + 1U;
     }
     for (size_t i = 0U; i < OUT; i++) {
         draw_terms(random, &t->weight[i * t->all], t->all, true);
-        draw_terms(random, &t->tail[i * IN], IN, true);
     }
     size_t to = 0U;
     for (size_t i = 0U; i < OUT; i += 2U) {
@@ -371,6 +369,19 @@ static wide sum_of_taps(const tables *t, const hg_real (*past)[IN], size_t k, si
             sum += (lag <= k) ? ((wide)*weight * past[k - lag][t->signal[g]]) : 0;
             weight++;
         }
+        weight++;
+    }
+    return sum;
+}
+
+static wide sum_of_tails(const tables *t, const hg_real (*past)[IN], size_t k, size_t i)
+{
+    const hg_real *tail = &t->weight[i * t->all];
+    wide sum = 0;
+    for (size_t g = 0U; g < IN; g++) {
+        tail = &tail[t->taps[g]];
+        sum += (k >= t->taps[g]) ? ((wide)*tail * past[k - t->taps[g]][t->signal[g]]) : 0;
+        tail++;
     }
     return sum;
 }
@@ -389,7 +400,7 @@ static void a_threshold_is_its_formula_with_one_rounding_a_sum(void **state)
         const hg_start how = ((run % 2) == 0) ? HG_START_REST : HG_START_MOVING;
         const hg_hull_config config = {.residuals = OUT, .width = IN, .exponent = exponent, .signal = t.signal, .taps = t.taps, .weight = t.laid_out,
             .settle = SETTLE, .rest = t.rest, .rest_left = t.rest_left, .moving = t.moving, .moving_left = t.moving_left, .bias = t.bias,
-            .decay = t.decay, .tail = t.tail};
+            .decay = t.decay};
         hg_hull self;
         hg_ring ring;
         hg_real memory[IN * LENGTH];
@@ -403,15 +414,12 @@ static void a_threshold_is_its_formula_with_one_rounding_a_sum(void **state)
             assert_status(HG_OK, hg_ring_push(&ring, past[k]));
             hg_hull_step(&self, &ring, J);
             for (size_t i = 0U; i < OUT; i++) {
-                wide behind = 0;
-                for (size_t g = 0U; g < IN; g++) {
-                    behind += (k >= t.taps[g]) ? ((wide)t.tail[(i * IN) + g] * past[k - t.taps[g]][t.signal[g]]) : 0;
-                }
-                expected[i] = at_most(divided((wide)t.decay[i] * expected[i], 31U) + divided(behind, (unsigned)(31 - exponent)));
+                const wide behind = sum_of_tails(&t, (const hg_real(*)[IN])past, k, i);
                 const bool rest = how == HG_START_REST;
                 if (k == SETTLE) {
                     expected[i] = at_most((wide)expected[i] + (rest ? t.rest_left : t.moving_left)[i]);
                 }
+                expected[i] = at_most(divided((wide)t.decay[i] * expected[i], 31U) + divided(behind, (unsigned)(31 - exponent)));
                 const hg_real bias = (k < SETTLE) ? (rest ? t.rest : t.moving)[(k * OUT) + i] : t.bias[i];
                 const wide taps = divided(sum_of_taps(&t, (const hg_real(*)[IN])past, k, i), (unsigned)(31 - exponent));
                 assert_int_equal(at_most(bias + taps + expected[i]), J[i]);
@@ -431,7 +439,7 @@ static void tables_with_an_exponent_out_of_range_are_refused(void **state)
     uint32_t random = 1U;
     draw_tables(&random, &t);
     hg_hull_config c = {.residuals = OUT, .width = IN, .signal = t.signal, .taps = t.taps, .weight = t.laid_out, .settle = SETTLE, .rest = t.rest,
-        .rest_left = t.rest_left, .moving = t.moving, .moving_left = t.moving_left, .bias = t.bias, .decay = t.decay, .tail = t.tail};
+        .rest_left = t.rest_left, .moving = t.moving, .moving_left = t.moving_left, .bias = t.bias, .decay = t.decay};
     for (int exponent = INT8_MIN; exponent <= INT8_MAX; exponent++) {
         c.exponent = (int8_t)exponent;
         assert_int_equal((exponent >= -31) && (exponent <= 30), hg_hull_valid(&c, IN, LENGTH));
@@ -472,7 +480,7 @@ static void a_hold_knows_values_and_radii_to_the_step(void **state)
         }
         const hg_hold_config config = {.trigger = &trigger, .margin = MARGIN, .scale = &scale, .half = &half, .slew = slew, .span = &span, .middle = &middle};
         hg_hold self;
-        int32_t codes[2];
+        int32_t codes[HG_HOLD_CODES(1U)];
         hg_real value;
         hg_real radius;
         uint8_t rewind;

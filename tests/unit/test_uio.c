@@ -33,10 +33,10 @@ static hg_real state_table[ORDER * ORDER];
 static hg_real input_table[ORDER * WIDTH];
 static hg_real output_table[ESTIMATES * ORDER];
 static hg_real direct_table[ESTIMATES * WIDTH];
-static hg_real weight_table[TAPS * ESTIMATES * WIDTH];
+static const uint8_t tap_list[WIDTH] = {TAPS, TAPS, TAPS, TAPS};
+static hg_real weight_table[ESTIMATES * WIDTH * (TAPS + 1U)]; /* the modes are all there is behind the taps: tails stay 0 */
 static const hg_real no_bias[ESTIMATES] = {R(0), R(0), R(0), R(0), R(0), R(0)};
 static hg_real tail_out[ESTIMATES];
-static const hg_real no_tail[ESTIMATES] = {R(0), R(0), R(0), R(0), R(0), R(0)};
 static hg_real mode_decay[MODES];
 static hg_real mode_in[MODES * WIDTH];
 static const hg_real mode_start[MODES] = {R(0)};
@@ -119,6 +119,13 @@ static void fill_matrices(void)
     }
 }
 
+/* Estimates 2n and 2n + 1 share a place: by signal, then by lag. */
+static size_t place_of(size_t i, size_t signal, size_t lag)
+{
+    const size_t pair = ((i / 2U) * WIDTH) + signal;
+    return (((pair * (TAPS + 1U)) + lag) * 2U) + (i % 2U);
+}
+
 /* |C A^(lag-1) B| from the tables, larger by what sums can lose; one mode from above: |A^lag| <= 8 x 0.96^lag, which the test checks. */
 static void fill_weights(void)
 {
@@ -128,7 +135,7 @@ static void fill_weights(void)
             response[i][j] = (double)input_table[(i * WIDTH) + j];
         }
         for (size_t i = 0U; i < ESTIMATES; i++) {
-            weight_table[(i * WIDTH) + j] = R(fabs((double)direct_table[(i * WIDTH) + j]) * 1.0001);
+            weight_table[place_of(i, j, 0U)] = R(fabs((double)direct_table[(i * WIDTH) + j]) * 1.0001);
         }
         mode_in[j] = R(1);
     }
@@ -142,7 +149,7 @@ static void fill_weights(void)
                     sum += (double)output_table[(i * ORDER) + l] * response[l][j];
                 }
                 if (lag < TAPS) {
-                    weight_table[(((lag * ESTIMATES) + i) * WIDTH) + j] = R(fabs(sum) * 1.0001);
+                    weight_table[place_of(i, j, lag)] = R(fabs(sum) * 1.0001);
                 } else {
                     const double bound = fabs(sum) / pow(0.96, (double)(lag - TAPS)) * 1.0001;
                     tail_out[i] = (bound > (double)tail_out[i]) ? R(bound) : tail_out[i];
@@ -169,9 +176,9 @@ static int fill_tables(void **state)
         .observer = {.order = ORDER, .residuals = ESTIMATES, .width = WIDTH, .signal = signal_list,
                      .state = {ORDER, ORDER, 0, state_table}, .input = {ORDER, WIDTH, 0, input_table},
                      .output = {ESTIMATES, ORDER, 0, output_table}, .direct = {ESTIMATES, WIDTH, 0, direct_table}},
-        .hull = {.residuals = ESTIMATES, .width = WIDTH, .signal = signal_list, .taps = TAPS, .weight = weight_table, .settle = 1U,
-                 .rest = no_bias, .moving = no_bias, .ready_rest = 1U, .ready_moving = 4U, .decay = R(0), .tail_input = no_tail,
-                 .tail_output = no_tail, .modes = MODES, .mode_decay = mode_decay, .mode_input = mode_in, .mode_output = tail_out,
+        .hull = {.residuals = ESTIMATES, .width = WIDTH, .signal = signal_list, .taps = tap_list, .weight = weight_table, .settle = 1U,
+                 .rest = no_bias, .rest_left = no_bias, .moving = no_bias, .moving_left = no_bias, .bias = no_bias, .ready_rest = 1U,
+                 .ready_moving = 4U, .decay = no_bias, .modes = MODES, .mode_decay = mode_decay, .mode_input = mode_in, .mode_output = tail_out,
                  .mode_rest = mode_start, .mode_moving = mode_start}};
     return 0;
 }
@@ -180,7 +187,7 @@ typedef struct {
     hg_uio  uio;
     hg_ring ring;
     hg_real ring_memory[SIGNALS * LENGTH];
-    hg_real memory[HG_UIO_REALS(ORDER, WIDTH, MODES) + 1U];
+    hg_real memory[HG_UIO_REALS(ORDER, WIDTH, ESTIMATES, MODES) + 1U];
     hg_real estimate[ESTIMATES + 1U];
     hg_real radius[ESTIMATES + 1U];
 } rig;
@@ -213,8 +220,9 @@ static void start_tells_null_and_bad_tables(void **state)
     hg_uio self;
     hg_ring ring;
     hg_real ring_memory[SIGNALS * LENGTH];
-    hg_real memory[HG_UIO_REALS(ORDER, WIDTH, MODES)];
+    hg_real memory[HG_UIO_REALS(ORDER, WIDTH, ESTIMATES, MODES)];
     const uint8_t outside[WIDTH] = {0U, 1U, 2U, SIGNALS};
+    const uint8_t long_taps[WIDTH] = {TAPS, TAPS, LENGTH, TAPS};
     assert_status(HG_OK, hg_ring_start(&ring, SIGNALS, LENGTH, ring_memory));
     assert_status(HG_E_ARGUMENT, hg_uio_start(NULL, &usual, &ring, HG_START_REST, memory));
     assert_status(HG_E_ARGUMENT, hg_uio_start(&self, NULL, &ring, HG_START_REST, memory));
@@ -227,7 +235,7 @@ static void start_tells_null_and_bad_tables(void **state)
     c[0].states = N + 1U;
     c[1].hull.residuals = 1U;
     c[2].observer.order = 1U;
-    c[3].hull.taps = LENGTH;
+    c[3].hull.taps = long_taps;
     c[4].observer.signal = outside;
     c[5].actuators = 255U; /* would wrap in 8 bits */
     c[5].sensors = 1U + (uint8_t)(1U + ESTIMATES - N - 1U);

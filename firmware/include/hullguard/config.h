@@ -72,4 +72,20 @@
 #error "HG_GENERATORS_MAX: 1 .. 32"
 #endif
 
+/* States of a fusion filter. Memory and time grow with the square and the cube of the number in use, not with this bound. */
+#ifndef HG_FUSION_STATES_MAX
+#define HG_FUSION_STATES_MAX 32U
+#endif
+#if (HG_FUSION_STATES_MAX < 1U) || (HG_FUSION_STATES_MAX > 255U)
+#error "HG_FUSION_STATES_MAX: 1 .. 255"
+#endif
+
+/* Scalar sensors of a fusion filter; sets of them are bits of one 16-bit word. */
+#ifndef HG_FUSION_SENSORS_MAX
+#define HG_FUSION_SENSORS_MAX 16U
+#endif
+#if (HG_FUSION_SENSORS_MAX < 1U) || (HG_FUSION_SENSORS_MAX > 16U)
+#error "HG_FUSION_SENSORS_MAX: 1 .. 16"
+#endif
+
 #endif

@@ -35,6 +35,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#if !HG_REAL_Q31
 #define HG_ISOLATE_LARGEST HG_REAL_C(1e9) /* of any force or estimate that is taken in: sums of squares stay finite in float32 */
 
 /* What the plant's behaviour comes from. 0 is not a good state. */
@@ -123,5 +124,7 @@ void hg_isolate_reset(hg_isolate *self);
  *  Cost, with c components: c x estimates multiplications; in an episode 2 (c + 1) (c + 3) more and 2 (c + 1) divisions; at the end of a block, for
  *  each block of the window, (c + 1)^3 and (c + 1)^2 divisions. */
 hg_status hg_isolate_step(hg_isolate *self, const hg_real *estimate, const hg_real *radius, hg_isolation *found);
+
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include "hullguard/hullguard.h"
 
+#if !HG_REAL_Q31
+#include "fusion_run.h"
+#endif
+
 #define HGH_STATES_MAX 64
 #define HGH_SIGNALS_MAX 96
 #define HGH_DISTURBANCES_MAX 192
@@ -188,6 +192,7 @@ int64_t hgh_batch(const hgh_run_config *config, int64_t first, int64_t count, hg
 int64_t hgh_sweep(const hgh_run_config *config, const hgh_fault *fault, int32_t faults, int64_t start, int64_t step, int64_t starts,
                   int64_t horizon, int32_t *delay);
 
+#if !HG_REAL_Q31
 /* An unknown-input observer with its own ring of radii, and the isolation of one of its estimates, sample after sample. */
 typedef struct {
     const hg_uio_config     *uio;
@@ -213,6 +218,7 @@ int64_t hgh_uio_steps(hgh_uio *self, const double *value, const double *radius, 
 
 /** [components + 1] offset and shares of the last window that was judged. */
 const hg_real *hgh_uio_share(const hgh_uio *self);
+#endif
 
 /** Bits on the wire with stuff bits and interframe space, exact; nominal and data phase together for FD. */
 uint32_t hgh_frame_bits(const hg_can_frame *frame);

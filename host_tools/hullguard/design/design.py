@@ -214,7 +214,7 @@ def find(model: Model, tick: Tick) -> Stored:
     observers = tuple(_found(model, i, radius, tick) for i in range(len(model.observers)))
     dA, dB = (plant.dA, plant.dB) if uncertain(model) else (None, None)
     gain = plant.feedback.gain if plant.feedback is not None else None
-    uios = tuple(uio_generator.find(model, i) for i in range(len(model.uios)))
+    uios = tuple(uio_generator.find(model, i, radius, reached.state) for i in range(len(model.uios)))
     return Stored(model.sha256, plant.A, plant.B, gain, digits(reached.state), digits(reached.signal), digits(reached.slew), observers, dA, dB, uios=uios)
 
 

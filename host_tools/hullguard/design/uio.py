@@ -9,6 +9,7 @@ The modes of (C, A1) that no output shows are the invariant zeros of (A, G, C): 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,8 @@ from hullguard.model.table import Array
 RANK = 1e-9  # relative to the largest singular value: below it a direction is rounding
 GROWTH = 1e-9  # of |A1|: a direction that A1 adds to the observable part and that is larger is no rounding
 MARGIN = 1e-9  # how far a mode must be inside the stable region to count as one that dies out
+FARTHEST = 1e5  # largest entry of A: a zero beyond is one at infinity, and rounding
+PLACED = 1e-5  # how far a pole may be from where it was asked for, as a share
 NAMED = 0.05  # of the largest entry of a direction: what is worth a name
 
 
@@ -134,9 +137,9 @@ def invariant_zeros(plant: Unknown) -> list[Zero]:
     mix = np.eye(n + q, n + m) if m == q else np.linalg.qr(np.random.default_rng(1).standard_normal((n + m, n + q)))[0].T
     values = scipy.linalg.eigvals(mix @ pencil, mix @ right)
     zeros = []
-    for s in values[np.isfinite(values) & (np.abs(values) < 1e6)]:
+    for s in values[np.isfinite(values) & (np.abs(values) < FARTHEST)]:
         _, sigma, Vh = np.linalg.svd(pencil - s * right)
-        if sigma[-1] < 1e-9 * max(1.0, abs(s)):
+        if sigma[-1] < 1e-9:
             v = np.conj(Vh[-1])
             v = v / v[int(np.argmax(np.abs(v[:n])))]
             length = np.maximum(np.linalg.norm(plant.G, axis=0), 1e-300)
@@ -238,6 +241,14 @@ def _placed(A: Array, C: Array, poles: Array, where: str) -> Array:
     if C.shape[0] == C.shape[1] and rank_of(C) == len(A) and np.all(np.isreal(poles)):
         return np.asarray((A - np.diag(poles.real)) @ np.linalg.inv(C))
     try:
-        return np.asarray(place_poles(A.T, C.T, poles, rtol=1e-9, maxiter=200).gain_matrix.T)
+        with warnings.catch_warnings():
+            # It warns that it could have made the gain less sensitive; whether the poles are where they should be is checked below.
+            warnings.simplefilter("ignore", UserWarning)
+            K = np.asarray(place_poles(A.T, C.T, poles, rtol=1e-9, maxiter=200).gain_matrix.T)
     except ValueError as error:
         raise InputError(f"{where}: these poles cannot be placed ({error}); take no pole more often than there are outputs, and complex ones in pairs") from error
+    found = np.linalg.eigvals(A - K @ C)
+    off = max(float(np.abs(found - p).min() / (1 + abs(p))) for p in poles)
+    if off > PLACED:
+        raise InputError(f"{where}: these poles cannot be placed, one is off by {off:.2g} of itself; spread them")
+    return K

@@ -12,7 +12,8 @@ from hullguard.design.arith import digits, mul, nearest32
 from hullguard.design.checks import Check
 from hullguard.design.hull import Linear, Ranges, rounded
 from hullguard.design.observer import ObserverMatrices, SubPlant
-from hullguard.design.uio_discrete import Estimator, between_samples, discretised, estimator, left_inverse, sampled, zero_order_hold
+from hullguard.design.uio_discrete import Discrete, Estimator, between_samples, discretised, estimator, left_inverse, sampled, zero_order_hold
+from hullguard.design.uio_inverse import answers, best_rows, within_a_sample
 from hullguard.design.uio_types import StoredUio
 from hullguard.errors import InputError
 from hullguard.model.plant import Plant
@@ -108,18 +109,15 @@ def _given(plant: uio.Unknown, spec: UioSpec, where: str) -> uio.Observer:
     return replace(made, F=spec.gains.F, K=spec.gains.K, H=spec.gains.H, T=T, TB=T @ plant.B)
 
 
-def find(model: Model, i: int) -> StoredUio:
-    """The observer of a specification, rounded for the design file."""
+def find(model: Model, i: int, radius: Array, state_range: Array) -> StoredUio:
+    """The observer of a specification, rounded for the design file. `radius` (signals): what radii usually are; `state_range` (n)."""
     spec, where = model.uios[i], where_of(model, i)
     refuse_others(model, where)
     made = _observer(model, spec, where)
     n, r, q = model.plant.n, len(spec.sensors), len(spec.actuators)
     d = discretised(made, model.sample_time_s)
     unknown = range(q, q + len(unknown_of(model).names))
-    # Every row of a left inverse stands for itself: what is trusted for the faults need not be best for the unknown inputs.
-    P = left_inverse(d.Gd, np.array([*spec.trust, *[1.0] * r]))
-    P[list(unknown)] = left_inverse(d.Gd)[list(unknown)]
-    d = replace(d, P=P)
+    d = replace(d, P=_left_inverse(model, spec, d, [*range(q), *unknown], radius, state_range))
     e = estimator(d, n, range(q), range(r), unknown, spec.low_pass_s)
     return StoredUio(
         digits(e.state),
@@ -130,6 +128,28 @@ def find(model: Model, i: int) -> StoredUio:
         digits(_passing(model, e) * UP),
         digits(made.fixed.real) + 1j * digits(made.fixed.imag),
     )
+
+
+def _left_inverse(model: Model, spec: UioSpec, d: Discrete, rows: list[int], radius: Array, state_range: Array) -> Array:
+    """P: by the model's trust in the states' equations, or the best for the radii."""
+    if spec.trust is not None:
+        return left_inverse(d.Gd, np.array([*spec.trust, *[1.0] * len(spec.sensors)]))
+    known, read = unknown_of(model), [model.outputs[k] for k in spec.outputs]
+    wide = radius[read] + np.array([model.signals[i].noise for i in read])
+    low_pass = model.sample_time_s / (spec.low_pass_s + model.sample_time_s)
+    moved = within_a_sample(known.A, known.G, known.rate, model.sample_time_s)
+    drift = np.vstack([moved, np.zeros((len(spec.sensors), moved.shape[1]))])
+    P = left_inverse(d.Gd)
+    P[rows] = best_rows(d, rows, np.hstack([answers(d, np.maximum(wide, 1e-12), _held(model, d, state_range), low_pass), drift]))
+    return P
+
+
+def _held(model: Model, d: Discrete, state_range: Array) -> Array:
+    """What a hold gets wrong in a sample, and what it lets through of unknown inputs: a bound for each state of the observer."""
+    n, known, period = model.plant.n, unknown_of(model), model.sample_time_s
+    follows, C, Ad = (d.T - d.K1d @ d.plant.C)[:, :n], d.plant.C[:, :n], d.Ad[:n, :n]
+    off = np.abs(follows @ Ad - d.Fd @ follows - (d.Fd @ d.K1d + d.K0) @ C) @ state_range
+    return np.asarray(off + np.abs(follows @ zero_order_hold(known.A, known.G, period)[1]) @ known.bound)
 
 
 def _passing(model: Model, e: Estimator) -> Array:

@@ -48,8 +48,8 @@ def without_feedthrough(plant: uio.Unknown, E: Array) -> uio.Unknown:
         return plant
     known = Vh[:rank].T @ np.diag(1.0 / sigma[:rank]) @ U[:, :rank].T
     left, rest = U[:, rank:].T, Vh[rank:].T
-    kept = tuple(f"f{i + 1}" for i in range(rest.shape[1])) if rank and rest.shape[1] != len(plant.inputs) else plant.inputs
-    named = [plant.inputs[int(np.argmax(np.abs(c)))] if np.max(np.abs(c)) > 1 - 1e-9 else kept[i] for i, c in enumerate(rest.T)]
+    # A direction that E does not show is one of the inputs by itself, or a mixture.
+    named = [plant.inputs[int(np.argmax(np.abs(c)))] if np.abs(c).max() > 1 - 1e-9 else f"mixture {i + 1} of {', '.join(plant.inputs)}" for i, c in enumerate(rest.T)]
     A = plant.A - plant.G @ known @ plant.C
     return uio.Unknown(A, plant.B, left @ plant.C, plant.G @ rest, plant.states, tuple(named), tuple(f"y without f, {i + 1}" for i in range(len(left))), plant.discrete)
 
@@ -113,3 +113,12 @@ def as_json(model: Model) -> dict[str, Any]:
         for s in every
     ]
     return {"sensor_sets": rows, "components": component_words(model)}
+
+
+def leaky_integration_error(leak_per_s: float, height_m: float, offset_mps2: float) -> float:
+    """How far a velocity v' = -leak v + (acceleration + offset) can be from the true one, m/s, once it has forgotten its start.
+
+    The error e obeys e' = -leak e + leak velocity - offset, hence e = leak (height - its low pass) - offset / leak: a body within +- height of its
+    mean gives 2 leak height at most.
+    """
+    return 2.0 * leak_per_s * height_m + abs(offset_mps2) / leak_per_s

@@ -65,7 +65,7 @@ class UioSpec:
     poles: tuple[complex, ...] | tuple[float, float, None]  # chosen, or slowest, fastest and none: as many in between as are free
     low_pass_s: float
     form: str  # one of FORMS
-    trust: tuple[float, ...]  # n: how much each state's equation counts in the reconstruction
+    trust: tuple[float, ...] | None  # n: how much each state's equation counts in the reconstruction; None: as is best for the radii
     gains: Gains | None
     isolate: IsolateSpec | None
 
@@ -177,9 +177,9 @@ def _gains(t: Table, n: int, m: int) -> Gains | None:
     return gains
 
 
-def _trust(t: Table, states: Sequence[str]) -> tuple[float, ...]:
+def _trust(t: Table, states: Sequence[str]) -> tuple[float, ...] | None:
     if "trust" not in t:
-        return (1.0,) * len(states)
+        return None
     return tuple(float(x) for x in t.vector("trust", len(states), 1e-12))
 
 

@@ -19,30 +19,46 @@ RESTARTED = Frame(0x100, ERROR, bytes(8))
 
 
 @dataclass(kw_only=True)
-class Drop(Action):
-    """Nothing."""
+class Swallow(Action):
+    """Frames that never come."""
 
-    about: ClassVar[str] = "swallow the frame"
-    example: ClassVar[str] = "drop@id=measurement,nth=5"
     needs_gateway: ClassVar[str] = "keep a frame from arriving"
     expects: ClassVar[tuple[str, ...]] = LOST
     also: ClassVar[tuple[str, ...]] = GONE
 
-    def fire(self, shot: Shot) -> Frame | None:
-        """Gone."""
-        shot.label([], "dropped")
+    def swallowed(self, shot: Shot, how: str) -> Frame | None:
+        """What becomes of one."""
+        shot.label([], how)
         return None
 
 
 @dataclass(kw_only=True)
-class Silence(Action):
+class Hold(Action):
+    """Frames that come later than they were sent."""
+
+    needs_gateway: ClassVar[str] = "hold a frame back"
+    expects: ClassVar[tuple[str, ...]] = ("late", "good", "sequence")
+    also: ClassVar[tuple[str, ...]] = MOVED
+
+
+@dataclass(kw_only=True)
+class Drop(Swallow):
+    """Nothing."""
+
+    about: ClassVar[str] = "swallow the frame"
+    example: ClassVar[str] = "drop@id=measurement,nth=5"
+
+    def fire(self, shot: Shot) -> Frame | None:
+        """Gone."""
+        return self.swallowed(shot, "dropped")
+
+
+@dataclass(kw_only=True)
+class Silence(Swallow):
     """A sender that says nothing for a while."""
 
     about: ClassVar[str] = "swallow every frame for a while, from the frame or moment on that sets it off"
     example: ClassVar[str] = "silence:lasts=0.5@id=measurement,at=10"
-    needs_gateway: ClassVar[str] = "keep a frame from arriving"
-    expects: ClassVar[tuple[str, ...]] = LOST
-    also: ClassVar[tuple[str, ...]] = GONE
     lasting: ClassVar[bool] = True
     lasts: float = option(1.0, LASTS, above=0.0)
     until_s: float = field(default=-math.inf, init=False)
@@ -60,8 +76,7 @@ class Silence(Action):
         """Gone, while it lasts."""
         if shot.frame is None or shot.time_s >= self.until_s:
             return shot.frame
-        shot.label([], "silent")
-        return None
+        return self.swallowed(shot, "silent")
 
 
 @dataclass(kw_only=True)
@@ -84,14 +99,11 @@ class BusOff(Silence):
 
 
 @dataclass(kw_only=True)
-class Delay(Action):
+class Delay(Hold):
     """Later."""
 
     about: ClassVar[str] = "the frame comes later; with jitter, later by chance, and out of order where that is so"
     example: ClassVar[str] = "delay:by=0.15,jitter=0.05@id=measurement,p=0.2"
-    needs_gateway: ClassVar[str] = "hold a frame back"
-    expects: ClassVar[tuple[str, ...]] = ("late", "good", "sequence")
-    also: ClassVar[tuple[str, ...]] = MOVED
     by: float = option(0.1, "seconds", low=0.0)
     jitter: float = option(0.0, "seconds more at most", low=0.0)
 
@@ -106,14 +118,11 @@ class Delay(Action):
 
 
 @dataclass(kw_only=True)
-class Reorder(Action):
+class Reorder(Hold):
     """Behind others."""
 
     about: ClassVar[str] = "the frame waits until others of the trigger's identifiers have passed it"
     example: ClassVar[str] = "reorder@id=measurement|control,p=0.1"
-    needs_gateway: ClassVar[str] = "hold a frame back"
-    expects: ClassVar[tuple[str, ...]] = ("late", "good", "sequence")
-    also: ClassVar[tuple[str, ...]] = MOVED
     behind: int = option(1, "how many pass it", low=1)
     patience: float = option(1.0, "seconds that it waits at most", above=0.0)
     _held: Pending | None = field(default=None, init=False)

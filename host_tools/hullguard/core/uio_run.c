@@ -1,5 +1,7 @@
 #include "host.h"
 
+#if !HG_REAL_Q31 /* isolation is for the float types */
+
 #include <stdlib.h>
 
 struct hgh_uio {
@@ -100,3 +102,5 @@ const hg_real *hgh_uio_share(const hgh_uio *self)
 {
     return self->isolate.share;
 }
+
+#endif
