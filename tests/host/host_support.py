@@ -121,11 +121,11 @@ def build_library(
 ) -> Library:
     """A library from a copy of the sources. `patch`: file name -> (text that must be there exactly once, what replaces it); `extra`: more files;
     `options`: of the compiler."""
-    source = folder / "src"
-    source.mkdir(parents=True)
-    for origin in (ROOT / "firmware" / "src", ROOT / "host_tools" / "hullguard" / "core"):
+    source, core = folder / "src", folder / "core"
+    for origin, copy in ((ROOT / "firmware" / "src", source), (ROOT / "host_tools" / "hullguard" / "core", core)):
+        copy.mkdir(parents=True)
         for file in (*origin.glob("*.c"), *origin.glob("*.h")):
-            shutil.copy(file, source / file.name)
+            shutil.copy(file, copy)
     for name, changes in (patch or {}).items():
         text = (source / name).read_text(encoding="utf-8")
         for old, new in changes:
@@ -136,10 +136,10 @@ def build_library(
         (source / name).write_text(text, encoding="utf-8")
     defined = f"-DHG_REAL_{real.upper()}=1"
     shared = folder / f"libhullguard_{real}.so"
-    files = [str(f) for f in sorted(source.glob("*.c"))]
-    subprocess.run(["gcc", *FLAGS, *options, defined, *INCLUDE, "-I", str(source), "-shared", "-Wl,--no-undefined", "-o", str(shared), *files, "-lm"], check=True)
+    files = [str(f) for where in (source, core) for f in sorted(where.glob("*.c"))]
+    subprocess.run(["gcc", *FLAGS, *options, defined, *INCLUDE, "-I", str(source), "-I", str(core), "-shared", "-Wl,--no-undefined", "-o", str(shared), *files, "-lm"], check=True)
     declare = ROOT / "host_tools" / "hullguard" / "core" / "declare"
-    done = subprocess.run(["gcc", "-E", "-P", "-nostdinc", defined, "-I", str(declare), *INCLUDE, str(source / "host.h")], check=True, capture_output=True, text=True)
+    done = subprocess.run(["gcc", "-E", "-P", "-nostdinc", defined, "-I", str(declare), *INCLUDE, str(core / "host.h")], check=True, capture_output=True, text=True)
     (folder / f"hullguard_{real}.i").write_text(done.stdout, encoding="utf-8")
     return Library(real, folder)
 

@@ -102,9 +102,21 @@ def test_a_fault_is_still_found_and_confirmed_while_every_tenth_frame_is_lost(mo
 
 
 def test_all_number_types_see_the_same_events_and_raise_the_same_alarms(models: Models, real: str) -> None:
-    """A verdict may differ between builds only where | |r| - J | <= eps_r: rare enough to show in none of these runs' delays by more than a sample."""
+    """A verdict may differ between builds only where | |r| - J | <= eps_r: rare enough to show in none of these runs' delays by more than a sample.
+
+    Both float types have float32's tables. Fixed point has smaller thresholds, by what rounding costs less there: where that is more than a sample
+    earlier, float32's residual was as close to its own threshold.
+    """
     other = "f64" if real == "f32" else "f32"
     rows = found(models.platoon("manoeuvres", None, real), 2, 1.0)
-    twins = found(models.platoon("manoeuvres", None, other), 2, 1.0)
-    moved = [abs(a["provisional_at"] - b["provisional_at"]) for a, b in zip(rows, twins, strict=True)]
-    assert sum(m > 1 for m in moved) == 0
+    ready = models.platoon("manoeuvres", None, other)
+    twins = found(ready, 2, 1.0)
+    assert [a["measurement"] for a in rows] == [b["measurement"] for b in twins]
+    moved = {a["run"]: a["provisional_at"] - b["provisional_at"] for a, b in zip(rows, twins, strict=True)}
+    assert max(moved.values()) <= 1
+    early = [run for run, by in moved.items() if by < -1]
+    assert real == "q31" or not early
+    rounding = ready.design.generators[0].tables.rounding + np.array(ready.design.fixed_rounding)
+    for run in early:
+        trace, at = ready.batch(SAMPLES, (f"controller2:bias:1.0@{START}",)).trace(run), rows[run]["provisional_at"]
+        assert np.any(trace["J"][at] - np.abs(trace["r"][at]) <= rounding)

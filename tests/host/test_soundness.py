@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host_support import SEED, Alarms, alarms
+from host_support import REALS, SEED, Alarms, alarms
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Batch, Native
 from hullguard.design.design import Design, design
@@ -172,7 +172,7 @@ def test_no_random_post_filter_is_less_than_all_pass(random_designs: tuple[list[
                 assert np.abs(np.linalg.svd(R @ from_d, compute_uv=False) - 1.0).max() <= limit, number
 
 
-@pytest.mark.parametrize("real", ["f32", "f64"])
+@pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("how", ["random", "corners"])
 def test_no_healthy_random_plant_raises_an_alarm(random_designs: tuple[list[tuple[int, Design]], list[str]], real: str, how: str) -> None:
     for number, made in random_designs[0]:
@@ -189,12 +189,15 @@ def test_no_healthy_random_plant_raises_an_alarm(random_designs: tuple[list[tupl
             assert alarms(rows) == Alarms(0, 0), f"plant {number}: |r|/J up to {max(r['margin'] for r in rows)}"
 
 
+@pytest.mark.parametrize("real", ["f32", "q31"])
 @pytest.mark.parametrize("start", [REST, MOVING], ids=["rest", "moving"])
 @pytest.mark.parametrize("loss", [0.1, 0.5])
-def test_no_alarm_of_a_healthy_random_plant_is_confirmed_whatever_is_lost(random_designs: tuple[list[tuple[int, Design]], list[str]], start: int, loss: float) -> None:
+def test_no_alarm_of_a_healthy_random_plant_is_confirmed_whatever_is_lost(
+    random_designs: tuple[list[tuple[int, Design]], list[str]], start: int, loss: float, real: str
+) -> None:
     lost = 0
     for number, made in random_designs[0]:
-        native = Native(library("f32"), made.tables)
+        native = Native(library(real), made.tables)
         rows = Batch(native, made, SAMPLES, Reference("mixed", 1.0, 30), (), SEED + number, loss=loss, start=start).runs(0, 30)
         lost += sum(r["lost"] for r in rows)
         assert alarms(rows).confirmed == 0, f"plant {number}"

@@ -137,7 +137,7 @@ def test_the_bound_on_unknown_inputs_is_needed(models: Models) -> None:
     found = Uio(library("f64"), uio_table(u), width=len(made.model.signals)).run(run.readings, 0.0 * run.readings)
     error = np.abs(found.estimate - truths(made, u, run))[:, 0]
     assert np.all(error <= found.radius[:, 0])
-    bare = replace(uio_table(u), rest=0.0 * u.tables.rest, mode_rest=0.0 * u.tables.mode_rest)
+    bare = replace(uio_table(u), rest=0.0 * u.tables.rest, moving=0.0 * u.tables.moving, mode_rest=0.0 * u.tables.mode_rest)
     narrow = Uio(library("f64"), bare, width=len(made.model.signals)).run(run.readings, 0.0 * run.readings)
     assert np.any(np.abs(narrow.estimate - truths(made, u, run))[100:, 0] > narrow.radius[100:, 0])
     assert error.max() > 0.02 * found.radius[-1, 0]

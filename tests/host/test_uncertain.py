@@ -267,23 +267,25 @@ def made(models: Models, pm: float) -> Design:
     return models.design(drag(pm) | {"detector.observers.0.search.trials": 300}, "manoeuvres")
 
 
-def test_no_false_alarm_on_any_plant_of_the_intervals_and_many_on_a_detector_that_knows_none(models: Models) -> None:
+@pytest.mark.parametrize("real", ["f32", "q31"])
+def test_no_false_alarm_on_any_plant_of_the_intervals_and_many_on_a_detector_that_knows_none(models: Models, real: str) -> None:
     dice = np.random.default_rng(SEED)
     design = made(models, 0.3)
     plants = [draw(design.model.plant, dice) for _ in range(40)]
     reference = design.model.scenario("manoeuvres").reference
-    rows = Batch(Native(library("f32"), design.tables), design, 200, reference, (), SEED, plants=plants).runs(0, 200)
+    rows = Batch(Native(library(real), design.tables), design, 200, reference, (), SEED, plants=plants).runs(0, 200)
     assert sum(r["false_provisional"] for r in rows) == 0
     assert max(r["margin"] for r in rows) <= 1.0
     blind = models.design({}, "manoeuvres")
-    rows = Batch(Native(library("f32"), blind.tables), blind, 200, reference, (), SEED, plants=plants).runs(0, 200)
+    rows = Batch(Native(library(real), blind.tables), blind, 200, reference, (), SEED, plants=plants).runs(0, 200)
     assert sum(r["false_provisional"] > 0 for r in rows) > 5, "these plants differ too little: this test shows nothing"
 
 
-def test_no_false_alarm_on_a_plant_that_varies_within_its_intervals(models: Models) -> None:
+@pytest.mark.parametrize("real", ["f32", "q31"])
+def test_no_false_alarm_on_a_plant_that_varies_within_its_intervals(models: Models, real: str) -> None:
     dice = np.random.default_rng(SEED)
     design = made(models, 0.3)
-    native, scenario = Native(library("f32"), design.tables), design.model.scenario("manoeuvres")
+    native, scenario = Native(library(real), design.tables), design.model.scenario("manoeuvres")
     for _ in range(20):
         _, readings = simulated(design.model, [draw(design.model.plant, dice) for _ in range(8)], dice, 200)
         rows = Batch(native, design, 200, scenario.reference, (), SEED, series=readings).runs(0, 1)
