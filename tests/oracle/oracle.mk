@@ -1,5 +1,5 @@
 # The independent check: the library against a second implementation in double precision (Eigen), on random problems.
-# HULLGUARD_SEED=n repeats a run. The library is built here with both sanitizers, because random tables reach corners that fixed ones
+# HULLGUARD_SEED=n repeats a run, HULLGUARD_PROBLEMS=n makes it longer (300 are usual). The library is built here with both sanitizers, because random tables reach corners that fixed ones
 # do not; a failed check jumps over destructors, so leaks are not reported.
 
 ORACLE       := tests/oracle

@@ -35,7 +35,7 @@ using Reals = std::vector<hg_real>;
 
 constexpr double unit = static_cast<double>(std::numeric_limits<hg_real>::epsilon()); /* two units of rounding of the library's number */
 constexpr double unit_double = std::numeric_limits<double>::epsilon();
-constexpr int    problems = 1000;
+inline int       problems = 300; /* of each kind; begin_run() */
 
 /* ---- Small tools ---- */
 
@@ -472,11 +472,13 @@ inline Matrix bias_by_error(const Loop &l, int rows)
     return bias;
 }
 
-/* Seed and number type of a run, from the environment. */
+/* Seed and length of a run, from the environment. */
 inline void begin_run()
 {
     const char *seed = std::getenv("HULLGUARD_SEED");
     the_seed = seed != nullptr ? std::strtoull(seed, nullptr, 10) : std::random_device{}();
+    const char *many = std::getenv("HULLGUARD_PROBLEMS");
+    problems = many != nullptr ? std::atoi(many) : problems;
     std::printf("HULLGUARD_SEED=%llu (%s)\n", static_cast<unsigned long long>(the_seed), sizeof(hg_real) == 8 ? "float64" : "float32");
 }
 

@@ -126,6 +126,22 @@ static void start_tells_null_and_bad_tables(void **state)
     assert_status(HG_OK, hg_hold_start(&self, &c, codes));
 }
 
+static void start_tells_a_scale_of_the_other_number_type(void **state)
+{
+    (void)state;
+    hg_hold self;
+    int32_t codes[3U * WIDTH];
+    for (int exponent = INT8_MIN; exponent <= INT8_MAX; exponent++) {
+        for (size_t g = 0U; g < WIDTH; g++) {
+            hg_code_scale scale[WIDTH] = {scale_table[0], scale_table[1]};
+            hg_hold_config c = usual;
+            c.scale = scale;
+            scale[g].exponent = (int8_t)exponent;
+            assert_status((exponent == 0) ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+        }
+    }
+}
+
 /* At every place of every table, and none behind them. */
 static void start_tells_numbers_that_are_no_radii(void **state)
 {
@@ -611,6 +627,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null_and_bad_tables),
         cmocka_unit_test(start_tells_numbers_that_are_no_radii),
+        cmocka_unit_test(start_tells_a_scale_of_the_other_number_type),
         cmocka_unit_test(before_the_first_frame_nothing_is_known),
         cmocka_unit_test(the_radius_follows_the_table_of_the_header),
         cmocka_unit_test(the_smaller_of_promise_and_slew_counts),
