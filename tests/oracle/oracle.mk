@@ -8,7 +8,8 @@ ORACLE_EIGEN ?= /usr/include/eigen3
 ORACLE_CXX   := $(CXX) -std=c++17 -O1 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
                 -isystem $(ORACLE_EIGEN) -Ifirmware/include $(DEPEND)
 ORACLE_TESTS := $(foreach r,$(FLOATS),$(patsubst $(ORACLE)/%.cpp,$(ORACLE_BUILD)/$(r)/%,$(wildcard $(ORACLE)/test_*.cpp)))
-OBJECTS += $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o $(ORACLE_TESTS:=.o)
+ORACLE_ONCE  := $(patsubst %,$(ORACLE_BUILD)/%.o,oracle problem oracle_run)
+OBJECTS += $(ORACLE_ONCE) $(ORACLE_TESTS:=.o)
 
 .PHONY: oracle
 oracle: $(ORACLE_TESTS) $(ORACLE_BUILD)/oracle_run ## the library against an independent implementation in double precision (random; HULLGUARD_SEED=n repeats)
@@ -16,7 +17,7 @@ oracle: $(ORACLE_TESTS) $(ORACLE_BUILD)/oracle_run ## the library against an ind
 	$(Q)sh $(ORACLE)/test_oracle_run.sh $(ORACLE_BUILD)/oracle_run $(ORACLE)
 TEST_PARTS += oracle
 
-$(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o: $(ORACLE_BUILD)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
+$(ORACLE_ONCE): $(ORACLE_BUILD)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
 	@mkdir -p $(@D)
 	$(Q)$(ORACLE_CXX) -c $< -o $@
 
@@ -27,7 +28,7 @@ $(eval $(call archive,$(ORACLE_BUILD)/$(1)/libhullguard.a,$(ORACLE_BUILD)/$(1),$
 $(filter $(ORACLE_BUILD)/$(1)/%,$(ORACLE_TESTS:=.o)): $(ORACLE_BUILD)/$(1)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
 	@mkdir -p $$(@D)
 	$$(Q)$$(ORACLE_CXX) $(REAL_FLAG_$(1)) -c $$< -o $$@
-$(filter $(ORACLE_BUILD)/$(1)/%,$(ORACLE_TESTS)): %: %.o $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/$(1)/libhullguard.a
+$(filter $(ORACLE_BUILD)/$(1)/%,$(ORACLE_TESTS)): %: %.o $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/problem.o $(ORACLE_BUILD)/$(1)/libhullguard.a
 	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
 endef
 $(foreach r,$(FLOATS),$(eval $(call oracle_variant,$(r))))

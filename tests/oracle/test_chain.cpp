@@ -1,7 +1,7 @@
 /** @file
  *  Holds the library against the oracle from a sensor's trigger to a verdict: trigger and hold, decision, whole detectors, banks of certificates.
  *  Built twice, for float32 and float64. HULLGUARD_SEED repeats a run. */
-#include "problem.hpp"
+#include "tables.hpp"
 
 #include <memory>
 #include <optional>

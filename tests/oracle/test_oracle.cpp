@@ -1,7 +1,7 @@
 /** @file
  *  Holds the library against the oracle on random problems, part by part: residuals, thresholds, unknown-input observers, isolation. Built
  *  twice, for float32 and float64. HULLGUARD_SEED repeats a run. */
-#include "problem.hpp"
+#include "tables.hpp"
 
 extern "C" {
 #include "hullguard/isolate.h"
@@ -384,12 +384,11 @@ struct Modes {
 
     Modes(const System &s, int taps)
     {
-        const Eigen::EigenSolver<Matrix> eigen(s.A);
-        const Eigen::MatrixXcd           S = eigen.eigenvectors();
-        const double                     widen = 1.0 + unit * (10.0 + static_cast<double>(s.B.cols() + s.A.rows()));
-        decay  = eigen.eigenvalues().cwiseAbs();
-        input  = (S.inverse() * s.B).cwiseAbs();
-        output = (s.C * S).cwiseAbs() * Vector(decay.array().pow(taps - 1)).asDiagonal();
+        const Spectrum spectrum = spectrum_of(s);
+        const double   widen = 1.0 + unit * (10.0 + static_cast<double>(s.B.cols() + s.A.rows()));
+        decay  = spectrum.decay;
+        input  = spectrum.input;
+        output = spectrum.output * Vector(decay.array().pow(taps - 1)).asDiagonal();
         HullTables::append(decay_table, decay.transpose() * (1.0 + 8.0 * unit));
         HullTables::append(input_table, input * widen);
         HullTables::append(output_table, output * widen);
