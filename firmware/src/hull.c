@@ -63,10 +63,10 @@ void hg_hull_reset(hg_hull *self, hg_start how)
 typedef struct {
     hg_acc first;
     hg_acc second;
-} hg_pair;
+} hg_hull_pair;
 
 /* One radius, with weights that follow one another. Returns the next of them. */
-static inline const hg_real *add_radius(hg_pair *sum, const hg_real *weight, hg_real radius, bool two)
+static inline const hg_real *add_radius(hg_hull_pair *sum, const hg_real *weight, hg_real radius, bool two)
 {
     sum->first = hg_acc_mac(sum->first, weight[0], radius);
     if (two) {
@@ -75,36 +75,40 @@ static inline const hg_real *add_radius(hg_pair *sum, const hg_real *weight, hg_
     return two ? &weight[2] : &weight[1];
 }
 
-/* `lags` radii, one a sample, back from this one on. */
-static inline const hg_real *add_lags(hg_pair *sum, const hg_real *weight, const hg_real *newest, uint8_t lags, uint8_t stride, bool two)
+/* `lags` radii, one a sample, back from this place on. */
+static inline const hg_real *add_lags(hg_hull_pair *sum, const hg_real *weight, const hg_real *data, uint32_t newest, uint8_t lags, uint8_t stride,
+                                      bool two)
 {
     const uint32_t end = (uint32_t)lags * stride;
-    hg_pair own = *sum;
+    const hg_real *next = weight;
+    hg_hull_pair own = *sum;
     for (uint32_t back = 0U; back < end; back += stride) {
-        weight = add_radius(&own, weight, *(newest - back), two);
+        next = add_radius(&own, next, data[newest - back], two);
     }
     *sum = own;
-    return weight;
+    return next;
 }
 
 /* All taps of one signal, then the radius that leaves them, which goes to the tail. `two` is a constant where this is called. */
-static inline const hg_real *add_signal(hg_pair *sum, hg_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal, uint8_t taps, bool two)
+static inline const hg_real *add_signal(hg_hull_pair *sum, hg_hull_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal,
+                                        uint8_t taps, bool two)
 {
     const uint8_t stride = ring->width;
     const uint8_t rows = (uint8_t)(ring->newest + 1U); /* from the newest back to where the ring wraps */
-    const hg_real *newest = &ring->data[((uint16_t)ring->newest * stride) + signal];
-    const hg_real *leaving;
+    const uint32_t newest = ((uint32_t)ring->newest * stride) + signal;
+    const hg_real *next;
+    uint32_t leaving;
     if (taps < rows) {
-        weight = add_lags(sum, weight, newest, taps, stride, two);
-        leaving = newest - ((uint16_t)taps * stride);
+        next = add_lags(sum, weight, ring->data, newest, taps, stride, two);
+        leaving = newest - ((uint32_t)taps * stride);
     } else {
-        const hg_real *last = &ring->data[((uint16_t)(ring->length - 1U) * stride) + signal];
+        const uint32_t last = (((uint32_t)ring->length - 1U) * stride) + signal;
         const uint8_t behind = (uint8_t)(taps - rows);
-        weight = add_lags(sum, weight, newest, rows, stride, two);
-        weight = add_lags(sum, weight, last, behind, stride, two);
-        leaving = last - ((uint16_t)behind * stride);
+        next = add_lags(sum, weight, ring->data, newest, rows, stride, two);
+        next = add_lags(sum, next, ring->data, last, behind, stride, two);
+        leaving = last - ((uint32_t)behind * stride);
     }
-    return add_radius(tail, weight, *leaving, two);
+    return add_radius(tail, next, ring->data[leaving], two);
 }
 
 /* What the initial state and the disturbances add at this sample; what is left of the initial state goes over into theta. */
@@ -152,14 +156,14 @@ static void move_modes(hg_hull *self, const hg_ring *ring)
 }
 
 /* Threshold of one residual from its sum over the taps; the modes are added to it. */
-static hg_real whole(const hg_hull *self, uint8_t i, hg_acc sum, hg_real bias, hg_real theta)
+static hg_real joined(const hg_hull *self, uint8_t i, hg_acc sum, hg_real bias, hg_real theta)
 {
     const hg_hull_config *config = self->config;
-    hg_acc all = sum;
+    hg_acc total = sum;
     for (uint8_t m = 0U; m < config->modes; m++) {
-        all = hg_acc_mac(all, config->mode_output[((uint16_t)i * config->modes) + m], self->mode[m]);
+        total = hg_acc_mac(total, config->mode_output[((uint16_t)i * config->modes) + m], self->mode[m]);
     }
-    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(all, config->exponent)), theta), HG_REAL_MAX);
+    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(total, config->exponent)), theta), HG_REAL_MAX);
 }
 
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
@@ -170,22 +174,22 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
     uint8_t i = 0U;
     move_modes(self, ring);
     while ((uint8_t)(i + 1U) < config->residuals) {
-        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
-        hg_pair tail = sum;
+        hg_hull_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_hull_pair tail = sum;
         for (uint8_t g = 0U; g < config->width; g++) {
             weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], true);
         }
-        J[i] = whole(self, i, sum.first, bias[i], move_tail(self, i, tail.first));
-        J[i + 1U] = whole(self, (uint8_t)(i + 1U), sum.second, bias[i + 1U], move_tail(self, (uint8_t)(i + 1U), tail.second));
+        J[i] = joined(self, i, sum.first, bias[i], move_tail(self, i, tail.first));
+        J[i + 1U] = joined(self, (uint8_t)(i + 1U), sum.second, bias[i + 1U], move_tail(self, (uint8_t)(i + 1U), tail.second));
         i += 2U;
     }
     if (i < config->residuals) {
-        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
-        hg_pair tail = sum;
+        hg_hull_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_hull_pair tail = sum;
         for (uint8_t g = 0U; g < config->width; g++) {
             weight = add_signal(&sum, &tail, weight, ring, config->signal[g], config->taps[g], false);
         }
-        J[i] = whole(self, i, sum.first, bias[i], move_tail(self, i, tail.first));
+        J[i] = joined(self, i, sum.first, bias[i], move_tail(self, i, tail.first));
     }
     self->k = (self->k < UINT16_MAX) ? (uint16_t)(self->k + 1U) : UINT16_MAX;
 }
