@@ -230,6 +230,7 @@ hg_status hg_detector_start(hg_detector *self, const hg_detector_config *config,
     self->memory = *memory;
     self->refusals = 0U;
     self->beginnings = 1U;
+    self->samples = 0U;
     self->value = memory->real;
     self->r = &self->value[config->width];
     self->J = &self->r[config->residuals];
@@ -266,6 +267,7 @@ static void reset_banks(hg_detector *self)
 void hg_detector_restart(hg_detector *self, hg_start how)
 {
     self->beginnings++;
+    self->samples = 0U;
     hg_ring_reset(&self->radii);
     for (uint8_t i = 0U; i < self->config->predictors; i++) {
         hg_predict_reset(&self->memory.predict[i]);
@@ -394,13 +396,15 @@ static void step_holds(hg_detector *self, hg_evidence *evidence)
         }
         if (rewind > 0U) {
             evidence->rewound |= (uint8_t)(1U << i);
-            for (uint8_t lag = 1U; (lag <= rewind) && (lag < config->history); lag++) {
+            /* What was before the beginning is the initial state's business, which the thresholds hold already. */
+            for (uint8_t lag = 1U; (lag <= rewind) && (lag <= self->samples) && (lag < config->history); lag++) {
                 widen_past(self, i, first, lag);
             }
         }
         first += config->hold[i].trigger->width;
     }
     derive(self, evidence->doubt);
+    self->samples = (self->samples < UINT8_MAX) ? (uint8_t)(self->samples + 1U) : UINT8_MAX;
 }
 
 static void refuse(hg_detector *self)

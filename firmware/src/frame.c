@@ -56,7 +56,8 @@ static bool scale_fits(const hg_field *field, const hg_code_scale *scale)
     const int64_t ones = is_signed ? ((int64_t)mask / 2) : (int64_t)mask;
     const int64_t least = is_signed ? -ones : 0;
     const int64_t most = is_signed ? ones : (ones - 1);
-    return ((field->flags & HG_FIELD_FLOAT32) != 0U) || ((scale->minimum >= least) && (scale->maximum <= most));
+    const bool holds = ((field->flags & HG_FIELD_FLOAT32) != 0U) || ((scale->minimum >= least) && (scale->maximum <= most));
+    return holds && hg_code_exponent_valid(scale->exponent);
 }
 
 bool hg_frame_valid(const hg_message *message)

@@ -27,6 +27,9 @@ static bool tables_valid(const hg_hold_config *config)
         const uint8_t width = config->trigger->width;
         valid = (config->scale != NULL) && (config->half != NULL) && (config->slew != NULL) && (config->span != NULL) &&
                 (config->middle != NULL);
+        for (uint8_t g = 0U; valid && (g < width); g++) {
+            valid = hg_code_exponent_valid(config->scale[g].exponent);
+        }
         valid = valid && radii_valid(config->half, width) && radii_valid(config->span, width) &&
                 radii_valid(config->slew, (uint16_t)((uint16_t)horizon(config) * width));
     }

@@ -63,10 +63,10 @@ void hg_hull_reset(hg_hull *self, hg_start how)
 typedef struct {
     hg_acc first;
     hg_acc second;
-} hg_pair;
+} hg_hull_pair;
 
 /* One radius, with weights that follow one another. Returns the next of them. */
-static inline const hg_real *add_radius(hg_pair *sum, const hg_real *weight, hg_real radius, bool two)
+static inline const hg_real *add_radius(hg_hull_pair *sum, const hg_real *weight, hg_real radius, bool two)
 {
     sum->first = hg_acc_mac(sum->first, *weight, radius);
     weight++;
@@ -78,7 +78,8 @@ static inline const hg_real *add_radius(hg_pair *sum, const hg_real *weight, hg_
 }
 
 /* All taps of one signal, then the radius that leaves them, which goes to the tail. `two` is a constant where this is called. */
-static inline const hg_real *add_signal(hg_pair *sum, hg_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal, uint8_t taps, bool two)
+static inline const hg_real *add_signal(hg_hull_pair *sum, hg_hull_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal,
+                                        uint8_t taps, bool two)
 {
     const uint8_t stride = ring->width;
     const hg_real *radius = &ring->data[((uint16_t)ring->newest * stride) + signal];
@@ -119,7 +120,7 @@ static const hg_real *bias_step(hg_hull *self)
 }
 
 /* The same of all signals. */
-static inline const hg_real *add_signals(hg_pair *sum, hg_pair *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
+static inline const hg_real *add_signals(hg_hull_pair *sum, hg_hull_pair *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
 {
     const hg_real *next = weight;
     for (uint8_t g = 0U; g < config->width; g++) {
@@ -166,8 +167,8 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
     move_modes(self, ring);
     for (uint16_t i = 0U; i < config->residuals; i += 2U) {
         const bool two = (i + 1U) < config->residuals;
-        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
-        hg_pair tail = sum;
+        hg_hull_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_hull_pair tail = sum;
         weight = two ? add_signals(&sum, &tail, weight, ring, config, true) : add_signals(&sum, &tail, weight, ring, config, false);
         J[i] = finish(self, (uint8_t)i, sum.first, tail.first, bias[i]);
         if (two) {

@@ -151,7 +151,7 @@ static bool is_steady(const hg_isolate_config *config, hg_real n, const moments 
     return (n * m->mean * m->mean) > (config->steady * config->steady * m->scatter);
 }
 
-static uint32_t bit(uint8_t i)
+static uint32_t place_bit(uint8_t i)
 {
     return (uint32_t)1U << i;
 }
@@ -162,7 +162,7 @@ static void conclude(hg_isolation *found, hg_cause cause, uint32_t candidates)
     found->candidates = candidates;
 }
 
-static void judge(hg_isolate *self, const factor *f)
+static void name_cause(hg_isolate *self, const factor *f)
 {
     const hg_isolate_config *config = self->config;
     hg_isolation *found = &self->found;
@@ -174,14 +174,14 @@ static void judge(hg_isolate *self, const factor *f)
     for (uint8_t i = 0U; i < config->components; i++) {
         const moments m = moments_of(f, (uint8_t)(i + 1U));
         if (names(config, i, n, &m, &fault)) {
-            named |= bit((uint8_t)(i + 1U));
+            named |= place_bit((uint8_t)(i + 1U));
             count++;
         }
         if (is_steady(config, n, &m) && (hg_real_abs(m.mean) >= (HG_REAL_C(0.5) * hg_real_abs(fault.mean)))) {
-            rivals |= bit((uint8_t)(i + 1U));
+            rivals |= place_bit((uint8_t)(i + 1U));
         }
     }
-    const uint32_t components = bit((uint8_t)(config->components + 1U)) - 2U;
+    const uint32_t components = place_bit((uint8_t)(config->components + 1U)) - 2U;
     found->explained = (fault.scatter > *f->rest) ? ((fault.scatter - *f->rest) / fault.scatter) : HG_REAL_ZERO;
     found->ratio = (fault.scatter > HG_REAL_ZERO) ? hg_real_min((n * fault.mean * fault.mean) / fault.scatter, HG_REAL_MAX) : HG_REAL_MAX;
     if (count > 0U) {
@@ -205,7 +205,7 @@ static void judge_window(hg_isolate *self)
         const factor block = factor_at(self, b);
         factor_merge(&window, &block, self->row);
     }
-    judge(self, &window);
+    name_cause(self, &window);
 }
 
 /* ---- The module ---- */
@@ -265,7 +265,7 @@ static void begin_episode(hg_isolate *self)
     self->open = 0U;
     self->complete = 0U;
     factor_clear(self, 0U);
-    conclude(&self->found, HG_CAUSE_UNDECIDED, bit((uint8_t)(self->config->components + 1U)) - 1U);
+    conclude(&self->found, HG_CAUSE_UNDECIDED, place_bit((uint8_t)(self->config->components + 1U)) - 1U);
 }
 
 static void end_episode(hg_isolate *self)
@@ -336,7 +336,7 @@ static void look_at_sensors(hg_isolate *self, const hg_real *estimate, const hg_
     uint32_t now = 0U;
     for (uint8_t i = 0U; i < config->sensors; i++) {
         const uint8_t e = config->sensor[i];
-        now |= outside(estimate[e], radius[e], config->sensor_limit[i]) ? bit(i) : 0U;
+        now |= outside(estimate[e], radius[e], config->sensor_limit[i]) ? place_bit(i) : 0U;
     }
     self->silent = (now != 0U) ? 0U : count_up(self->silent);
     self->seen = (self->silent >= config->release) ? 0U : (self->seen | now);

@@ -1,23 +1,23 @@
 # The independent check: the library against a second implementation in double precision (Eigen), on random problems.
-# HULLGUARD_SEED=n repeats a run. The library is built here with both sanitizers, because random tables reach corners that fixed ones
+# HULLGUARD_SEED=n repeats a run, HULLGUARD_PROBLEMS=n makes it longer (300 are usual). The library is built here with both sanitizers, because random tables reach corners that fixed ones
 # do not; a failed check jumps over destructors, so leaks are not reported.
 
 ORACLE       := tests/oracle
 ORACLE_BUILD := $(BUILD)/oracle
 ORACLE_EIGEN ?= /usr/include/eigen3
-ORACLE_CXX   := $(CXX) -std=c++17 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
+ORACLE_CXX   := $(CXX) -std=c++17 -O1 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
                 -isystem $(ORACLE_EIGEN) -Ifirmware/include $(DEPEND)
-ORACLE_PROGRAMS := $(FLOATS:%=$(ORACLE_BUILD)/test_oracle_%) $(FLOATS:%=$(ORACLE_BUILD)/test_fusion_%) $(ORACLE_BUILD)/oracle_run
-OBJECTS += $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o $(FLOATS:%=$(ORACLE_BUILD)/test_oracle_%.o) $(FLOATS:%=$(ORACLE_BUILD)/test_fusion_%.o)
+ORACLE_TESTS := $(foreach r,$(FLOATS),$(patsubst $(ORACLE)/%.cpp,$(ORACLE_BUILD)/$(r)/%,$(wildcard $(ORACLE)/test_*.cpp)))
+ORACLE_ONCE  := $(patsubst %,$(ORACLE_BUILD)/%.o,oracle problem oracle_run)
+OBJECTS += $(ORACLE_ONCE) $(ORACLE_TESTS:=.o)
 
 .PHONY: oracle
-oracle: $(ORACLE_PROGRAMS) ## the library against an independent implementation in double precision (random; HULLGUARD_SEED=n repeats)
-	$(Q)set -e; for real in $(FLOATS); do ASAN_OPTIONS=detect_leaks=0 timeout 300 $(ORACLE_BUILD)/test_oracle_$$real; \
-	  ASAN_OPTIONS=detect_leaks=0 timeout 300 $(ORACLE_BUILD)/test_fusion_$$real; done
+oracle: $(ORACLE_TESTS) $(ORACLE_BUILD)/oracle_run ## the library against an independent implementation in double precision (random; HULLGUARD_SEED=n repeats)
+	$(Q)set -e; for test in $(ORACLE_TESTS); do ASAN_OPTIONS=detect_leaks=0 timeout 300 $$test; done
 	$(Q)sh $(ORACLE)/test_oracle_run.sh $(ORACLE_BUILD)/oracle_run $(ORACLE)
 TEST_PARTS += oracle
 
-$(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o: $(ORACLE_BUILD)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
+$(ORACLE_ONCE): $(ORACLE_BUILD)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
 	@mkdir -p $(@D)
 	$(Q)$(ORACLE_CXX) -c $< -o $@
 
@@ -25,15 +25,10 @@ $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/oracle_run.o: $(ORACLE_BUILD)/%.o: $(OR
 define oracle_variant
 $(eval $(call objects,$(ORACLE_BUILD)/$(1),$(LIB_SRC),$$(CC_asan) $(REAL_FLAG_$(1))))
 $(eval $(call archive,$(ORACLE_BUILD)/$(1)/libhullguard.a,$(ORACLE_BUILD)/$(1),$(LIB_SRC)))
-$(ORACLE_BUILD)/test_oracle_$(1).o: $(ORACLE)/test_oracle.cpp $(ORACLE)/oracle.mk
+$(filter $(ORACLE_BUILD)/$(1)/%,$(ORACLE_TESTS:=.o)): $(ORACLE_BUILD)/$(1)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk
 	@mkdir -p $$(@D)
 	$$(Q)$$(ORACLE_CXX) $(REAL_FLAG_$(1)) -c $$< -o $$@
-$(ORACLE_BUILD)/test_oracle_$(1): $(ORACLE_BUILD)/test_oracle_$(1).o $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/$(1)/libhullguard.a
-	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
-$(ORACLE_BUILD)/test_fusion_$(1).o: $(ORACLE)/test_fusion.cpp $(ORACLE)/oracle.mk
-	@mkdir -p $$(@D)
-	$$(Q)$$(ORACLE_CXX) $(REAL_FLAG_$(1)) -c $$< -o $$@
-$(ORACLE_BUILD)/test_fusion_$(1): $(ORACLE_BUILD)/test_fusion_$(1).o $(ORACLE_BUILD)/$(1)/libhullguard.a
+$(filter $(ORACLE_BUILD)/$(1)/%,$(ORACLE_TESTS)): %: %.o $(ORACLE_BUILD)/oracle.o $(ORACLE_BUILD)/problem.o $(ORACLE_BUILD)/$(1)/libhullguard.a
 	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
 endef
 $(foreach r,$(FLOATS),$(eval $(call oracle_variant,$(r))))

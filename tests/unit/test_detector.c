@@ -378,6 +378,39 @@ static void restart_forgets_alarms(void **state)
     assert_int_equal(HG_PLANT_NONE, step(&r));
 }
 
+/* A loss that shows after a restart corrects no radius from before it: the residual has not seen that sample. */
+static void a_rewind_ends_where_the_detector_began(void **state)
+{
+    (void)state;
+    for (uint32_t since = 0U; since < 4U; since++) {
+        rig r;
+        begin(&r, HG_START_REST);
+        for (int k = 0; k < 2; k++) {
+            give(&r, 0U, 0, 0, true);
+            give(&r, 1U, 0, 0, true);
+            (void)step(&r);
+        }
+        for (uint32_t k = 0U; k < 3U; k++) { /* silence is relied on in all three */
+            if (k == (3U - since)) {
+                hg_detector_restart(&r.self, HG_START_MOVING);
+            }
+            give(&r, 1U, 0, 0, true);
+            (void)step(&r);
+        }
+        if (since == 0U) {
+            hg_detector_restart(&r.self, HG_START_MOVING);
+        }
+        give(&r, 0U, 0, 0, false);
+        give(&r, 1U, 0, 0, true);
+        (void)step(&r);
+        assert_count(since + 1U, r.self.samples);
+        for (uint8_t lag = 1U; lag < 4U; lag++) {
+            assert_real((lag <= since) ? SM_SLEW(4U - lag) : R(0), hg_ring_row(&r.self.radii, lag)[1]);
+        }
+        assert_real(SM_HALF, hg_ring_row(&r.self.radii, 0U)[1]);
+    }
+}
+
 /* Their thetas take their memory from the detector's, and shift nobody else's. */
 static void a_threshold_with_modes_stands_beside_the_others(void **state)
 {
@@ -555,6 +588,7 @@ int main(void)
         cmocka_unit_test(a_lost_frame_takes_a_provisional_alarm_back),
         cmocka_unit_test(a_moving_start_shows_until_it_has_settled),
         cmocka_unit_test(restart_forgets_alarms),
+        cmocka_unit_test(a_rewind_ends_where_the_detector_began),
         cmocka_unit_test(a_threshold_with_modes_stands_beside_the_others),
         cmocka_unit_test(a_refused_generator_begins_again_and_the_others_go_on),
         cmocka_unit_test(two_detectors_share_tables_and_nothing_else),

@@ -288,6 +288,12 @@ static void messages_that_no_frame_can_carry_are_invalid(void **state)
             (length == 24U) || (length == 32U) || (length == 48U) || (length == 64U);
         assert_int_equal(fd, hg_frame_valid(&m));
     }
+    for (int exponent = INT8_MIN; exponent <= INT8_MAX; exponent++) {
+        hg_code_scale other = scale;
+        m = usual, m.scale = &other;
+        other.exponent = (int8_t)exponent;
+        assert_int_equal(exponent == 0, hg_frame_valid(&m)); /* only scales of Q31 carry a power of two */
+    }
 }
 
 static void fields_outside_the_frame_or_of_no_type_are_invalid(void **state)

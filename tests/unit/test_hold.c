@@ -121,8 +121,50 @@ static void start_tells_null_and_bad_tables(void **state)
     c = usual, c.middle = NULL;
     assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
     assert_codes_untouched(codes, 3U * WIDTH);
-    c = usual, c.margin = (uint8_t)(254U - INTERVAL);
+    static hg_real long_slew[254U * WIDTH];
+    c = usual, c.slew = long_slew, c.margin = (uint8_t)(254U - INTERVAL);
     assert_status(HG_OK, hg_hold_start(&self, &c, codes));
+}
+
+static void start_tells_a_scale_of_the_other_number_type(void **state)
+{
+    (void)state;
+    hg_hold self;
+    int32_t codes[3U * WIDTH];
+    for (int exponent = INT8_MIN; exponent <= INT8_MAX; exponent++) {
+        for (size_t g = 0U; g < WIDTH; g++) {
+            hg_code_scale scale[WIDTH] = {scale_table[0], scale_table[1]};
+            hg_hold_config c = usual;
+            c.scale = scale;
+            scale[g].exponent = (int8_t)exponent;
+            assert_status((exponent == 0) ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+        }
+    }
+}
+
+/* At every place of every table, and none behind them. */
+static void start_tells_numbers_that_are_no_radii(void **state)
+{
+    (void)state;
+    const hg_real bad[] = {REAL_NAN, REAL_INF, -REAL_INF, R(-0.125)};
+    hg_hold self;
+    int32_t codes[3U * WIDTH];
+    arm_codes(codes, 3U * WIDTH);
+    for (size_t place = 0U; place < ((2U + HORIZON) * WIDTH); place++) {
+        for (size_t i = 0U; i < COUNT(bad); i++) {
+            hg_real table[(2U + HORIZON) * WIDTH];
+            hg_hold_config c = usual;
+            (void)memcpy(table, half_table, sizeof(half_table));
+            (void)memcpy(&table[WIDTH], span_table, sizeof(span_table));
+            (void)memcpy(&table[2U * WIDTH], slew_table, sizeof(slew_table));
+            c.half = table;
+            c.span = &table[WIDTH];
+            c.slew = &table[2U * WIDTH];
+            table[place] = bad[i];
+            assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+        }
+    }
+    assert_codes_untouched(codes, 3U * WIDTH);
 }
 
 static void before_the_first_frame_nothing_is_known(void **state)
@@ -584,6 +626,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null_and_bad_tables),
+        cmocka_unit_test(start_tells_numbers_that_are_no_radii),
+        cmocka_unit_test(start_tells_a_scale_of_the_other_number_type),
         cmocka_unit_test(before_the_first_frame_nothing_is_known),
         cmocka_unit_test(the_radius_follows_the_table_of_the_header),
         cmocka_unit_test(the_smaller_of_promise_and_slew_counts),

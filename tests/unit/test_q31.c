@@ -213,10 +213,14 @@ static void a_float_field_is_refused(void **state)
     (void)state;
     const hg_field field = {.start = 0U, .length = 32U, .flags = HG_FIELD_FLOAT32};
     const hg_code_scale scale = scale_of(HG_REAL_C(0.5), -16, 0);
-    const hg_e2e_config none = {.profile = HG_E2E_NONE};
+    const hg_e2e_config none = {.profile = HG_E2E_NONE, .stamp = HG_E2E_NO_STAMP, .limits = &hg_e2e_limits_default};
+    const hg_field integer = {.start = 0U, .length = 32U, .flags = HG_FIELD_SIGNED};
     const hg_message message = {.id = 1U, .length = 8U, .width = 1U, .field = &field, .scale = &scale, .e2e = &none};
     hg_can_frame frame;
     int32_t code = 7;
+    hg_message other = message;
+    other.field = &integer;
+    assert_true(hg_frame_valid(&other)); /* nothing but the field's type is wrong */
     assert_false(hg_frame_valid(&message));
     hg_frame_pack(&message, &code, &frame);
     assert_status(HG_OK, hg_frame_unpack(&message, &frame, &code));
@@ -507,6 +511,48 @@ static void a_hold_knows_values_and_radii_to_the_step(void **state)
     assert_true(promised > 0U);
 }
 
+static void scales_with_an_exponent_out_of_range_are_refused(void **state)
+{
+    (void)state;
+    const uint8_t silence[] = {0U};
+    const uint16_t delta[] = {0U};
+    const int32_t none[] = {0};
+    const hg_trigger_config trigger = {.width = 1U, .levels = 1U, .interval_max = 1U, .silence = silence, .delta = delta, .sigma = none,
+                                       .activity = none, .zero = none};
+    const hg_real one[] = {1};
+    const hg_field field = {.start = 0U, .length = 16U, .flags = HG_FIELD_SIGNED};
+    const hg_e2e_config e2e = {.profile = HG_E2E_NONE, .stamp = HG_E2E_NO_STAMP, .limits = &hg_e2e_limits_default};
+    for (int exponent = INT8_MIN; exponent <= INT8_MAX; exponent++) {
+        hg_code_scale scale = scale_of(HG_REAL_C(0.5), (int8_t)exponent, 0);
+        scale.minimum = -32767;
+        const hg_hold_config config = {.trigger = &trigger, .margin = 0U, .scale = &scale, .half = one, .slew = one, .span = one, .middle = one};
+        const hg_message message = {.id = 1U, .length = 8U, .width = 1U, .field = &field, .scale = &scale, .e2e = &e2e};
+        const bool valid = (exponent >= -40) && (exponent <= 0);
+        hg_hold self;
+        int32_t codes[HG_HOLD_CODES(1U)];
+        assert_int_equal(valid ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &config, codes));
+        assert_int_equal(valid, hg_frame_valid(&message));
+    }
+}
+
+/* At the ends of the range nothing is shifted out of its 64 bits, whatever comes. */
+static void codes_at_the_ends_of_the_exponents(void **state)
+{
+    (void)state;
+    const int8_t exponents[] = {-40, -39, -1, 0};
+    for (size_t e = 0U; e < COUNT(exponents); e++) {
+        for (size_t i = 0U; i < COUNT(edges); i++) {
+            for (size_t j = 0U; j < COUNT(edges); j++) {
+                const wide value = divided((wide)edges[i] * edges[j], (unsigned)-exponents[e]);
+                assert_int_equal(held(value), hg_real_of_code(edges[i], exponents[e], edges[j]));
+                const wide code = divided((wide)edges[i] * edges[j], (unsigned)(60 + exponents[e]));
+                const bool known = (edges[i] >= -HG_REAL_MAX) && (edges[i] <= HG_REAL_MAX) && (code > -(wide)INT32_MAX) && (code < INT32_MAX);
+                assert_int_equal(known ? (int32_t)code : INT32_MIN, hg_real_to_code(edges[i], edges[j], exponents[e]));
+            }
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -522,6 +568,8 @@ int main(void)
         cmocka_unit_test(a_threshold_is_its_formula_with_one_rounding_a_sum),
         cmocka_unit_test(tables_with_an_exponent_out_of_range_are_refused),
         cmocka_unit_test(a_hold_knows_values_and_radii_to_the_step),
+        cmocka_unit_test(scales_with_an_exponent_out_of_range_are_refused),
+        cmocka_unit_test(codes_at_the_ends_of_the_exponents),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,7 +14,7 @@ typedef struct {           /* flash: one a signal, generated */
     hg_real resolution;  /* signal units a code, > 0; Q31: times 2^exponent */
     hg_real offset;      /* signal value of code 0 */
     hg_real per_unit;    /* codes a signal unit: 1 / resolution; Q31: 1 / (4 resolution) */
-    int8_t  exponent;    /* Q31: -40 .. 0; 0 for the float types */
+    int8_t  exponent;    /* Q31: -40 .. 0; 0 for the float types: hg_code_exponent_valid() */
     int32_t minimum;     /* smallest valid code, > INT32_MIN */
     int32_t maximum;     /* largest valid code */
 } hg_code_scale;

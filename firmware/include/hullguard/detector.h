@@ -73,6 +73,7 @@ typedef struct {                /* RAM: one a detector */
     hg_real                  *J;         /* [residuals] of the last sample */
     hg_real                  *past;      /* [width] scratch */
     uint32_t                  refusals;  /* generator and bank steps refused for a number that is not finite; saturates */
+    uint8_t                   samples;   /* closed since it began, saturated: no radius before is corrected */
     uint32_t                  beginnings; /* the start and restarts since, wraps: what keeps a state beside it (uio.h) begins again with it */
 } hg_detector;
 

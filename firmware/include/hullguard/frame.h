@@ -53,7 +53,7 @@ typedef struct {                   /* flash: one a message */
 } hg_message;
 
 /** Do all fields lie inside the frame and clear of the protection, is the protection valid, can an integer field hold every code of its scale
- *  beside the invalid pattern, and is the length one that the format can carry? Fields that overlap one another are not looked for.
+ *  beside the invalid pattern, is the scale's exponent valid, and is the length one that the format can carry? Fields that overlap one another are not looked for.
  *  Cost: a pass over the fields' bits. */
 bool hg_frame_valid(const hg_message *message);
 

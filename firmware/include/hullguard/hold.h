@@ -66,7 +66,8 @@ typedef struct {               /* RAM: one a group */
  *  @param[in] codes  [HG_HOLD_CODES(width)] memory, owned by the caller
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
- *  @retval HG_E_CONFIG    the trigger's tables are not valid, one of the group's is missing or holds no radius, or interval_max + margin does not fit */
+ *  @retval HG_E_CONFIG    the trigger's tables are not valid, one of the group's is missing, holds no radius or a scale's
+ *                         exponent that is not valid, or interval_max + margin does not fit */
 hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes);
 
 /** Take a good frame of the open sample (the one that the next hg_hold_step() will take).

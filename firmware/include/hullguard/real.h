@@ -120,13 +120,20 @@ static inline bool hg_exponent_valid(int8_t exponent)
     return (exponent >= -31) && (exponent <= 30);
 }
 
-/** resolution code 2^exponent, rounds; exponent -62 .. 0. */
+/** May a scale of codes have this power of two? -40: the smallest code that one of 31 bits can stand for in an hg_real is less than a step then. */
+static inline bool hg_code_exponent_valid(int8_t exponent)
+{
+    return (exponent >= -40) && (exponent <= 0);
+}
+
+/** resolution code 2^exponent, rounds; hg_code_exponent_valid(). */
 static inline hg_real hg_real_of_code(hg_real resolution, int8_t exponent, int32_t code)
 {
     return hg_q31_saturate(hg_q31_shift((int64_t)resolution * code, (uint8_t)(-exponent)));
 }
 
-/** x per_unit 2^-exponent / 4 to the nearest integer, ties away from zero, per_unit = 1 / (4 resolution); INT32_MIN where there is none. */
+/** x per_unit 2^-exponent / 4 to the nearest integer, ties away from zero, per_unit = 1 / (4 resolution); INT32_MIN where there is none;
+ *  hg_code_exponent_valid(). */
 static inline int32_t hg_real_to_code(hg_real x, hg_real per_unit, int8_t exponent)
 {
     const int32_t places = 60 + (int32_t)exponent;
@@ -201,6 +208,12 @@ static inline hg_real hg_real_widen(hg_real x, hg_real factor)
 
 /** Only Q31 tables are scaled. */
 static inline bool hg_exponent_valid(int8_t exponent)
+{
+    return exponent == 0;
+}
+
+/** Only scales of Q31 carry a power of two. */
+static inline bool hg_code_exponent_valid(int8_t exponent)
 {
     return exponent == 0;
 }
