@@ -63,41 +63,39 @@ void hg_hull_reset(hg_hull *self, hg_start how)
 typedef struct {
     hg_acc first;
     hg_acc second;
-} hg_hull_pair;
+} hg_sums;
 
 /* One radius, with weights that follow one another. Returns the next of them. */
-static inline const hg_real *add_radius(hg_hull_pair *sum, const hg_real *weight, hg_real radius, bool two)
+static inline const hg_real *add_radius(hg_sums *sum, const hg_real *weight, hg_real radius, bool two)
 {
-    sum->first = hg_acc_mac(sum->first, *weight, radius);
-    weight++;
+    sum->first = hg_acc_mac(sum->first, weight[0], radius);
     if (two) {
-        sum->second = hg_acc_mac(sum->second, *weight, radius);
-        weight++;
+        sum->second = hg_acc_mac(sum->second, weight[1], radius);
     }
-    return weight;
+    return two ? &weight[2] : &weight[1];
 }
 
 /* All taps of one signal, then the radius that leaves them, which goes to the tail. `two` is a constant where this is called. */
-static inline const hg_real *add_signal(hg_hull_pair *sum, hg_hull_pair *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal,
-                                        uint8_t taps, bool two)
+static inline const hg_real *add_signal(hg_sums *sum, hg_sums *tail, const hg_real *weight, const hg_ring *ring, uint8_t signal, uint8_t taps, bool two)
 {
-    const uint8_t stride = ring->width;
-    const hg_real *radius = &ring->data[((uint16_t)ring->newest * stride) + signal];
+    const int16_t back = -(int16_t)ring->width;
+    const hg_real *radius = &ring->data[((uint16_t)ring->newest * ring->width) + signal];
+    const hg_real *next = weight;
     uint8_t lags = taps;
     if (taps > ring->newest) { /* the ring wraps behind its first row */
         for (uint8_t lag = 0U; lag < ring->newest; lag++) {
-            weight = add_radius(sum, weight, *radius, two);
-            radius = radius - stride;
+            next = add_radius(sum, next, *radius, two);
+            radius = &radius[back];
         }
-        weight = add_radius(sum, weight, *radius, two);
-        radius = &ring->data[((uint16_t)(ring->length - 1U) * stride) + signal];
+        next = add_radius(sum, next, *radius, two);
+        radius = &ring->data[((uint16_t)(ring->length - 1U) * ring->width) + signal];
         lags = (uint8_t)(taps - ring->newest - 1U);
     }
     for (; lags > 0U; lags--) {
-        weight = add_radius(sum, weight, *radius, two);
-        radius = radius - stride;
+        next = add_radius(sum, next, *radius, two);
+        radius = &radius[back];
     }
-    return add_radius(tail, weight, *radius, two);
+    return add_radius(tail, next, *radius, two);
 }
 
 /* What the initial state and the disturbances add at this sample; what is left of the initial state goes over into theta. */
@@ -120,7 +118,7 @@ static const hg_real *bias_step(hg_hull *self)
 }
 
 /* The same of all signals. */
-static inline const hg_real *add_signals(hg_hull_pair *sum, hg_hull_pair *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
+static inline const hg_real *add_signals(hg_sums *sum, hg_sums *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
 {
     const hg_real *next = weight;
     for (uint8_t g = 0U; g < config->width; g++) {
@@ -152,11 +150,11 @@ static hg_real finish(hg_hull *self, uint8_t i, hg_acc sum, hg_acc leaving, hg_r
     const hg_real kept = hg_real_mul(config->decay[i], self->theta[i]);
     /* Held finite: an infinite theta would never heal. */
     self->theta[i] = hg_real_min(hg_real_add(kept, hg_acc_real(leaving, config->exponent)), HG_REAL_MAX);
-    hg_acc all = sum;
+    hg_acc total = sum;
     for (uint8_t m = 0U; m < config->modes; m++) {
-        all = hg_acc_mac(all, config->mode_output[((uint16_t)i * config->modes) + m], self->mode[m]);
+        total = hg_acc_mac(total, config->mode_output[((uint16_t)i * config->modes) + m], self->mode[m]);
     }
-    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(all, config->exponent)), self->theta[i]), HG_REAL_MAX);
+    return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(total, config->exponent)), self->theta[i]), HG_REAL_MAX);
 }
 
 void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
@@ -167,8 +165,8 @@ void hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
     move_modes(self, ring);
     for (uint16_t i = 0U; i < config->residuals; i += 2U) {
         const bool two = (i + 1U) < config->residuals;
-        hg_hull_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
-        hg_hull_pair tail = sum;
+        hg_sums sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_sums tail = sum;
         weight = two ? add_signals(&sum, &tail, weight, ring, config, true) : add_signals(&sum, &tail, weight, ring, config, false);
         J[i] = finish(self, (uint8_t)i, sum.first, tail.first, bias[i]);
         if (two) {

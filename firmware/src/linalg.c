@@ -6,10 +6,10 @@
 typedef struct {
     hg_acc first;
     hg_acc second;
-} hg_pair;
+} hg_rows;
 
 /* Two rows from here on. Returns the next ones. */
-static inline const hg_real *add_rows(hg_pair *sum, const hg_real *first, const hg_real *x, uint8_t cols)
+static inline const hg_real *add_rows(hg_rows *sum, const hg_real *first, const hg_real *x, uint8_t cols)
 {
     const hg_real *upper = first;
     const hg_real *const end = &first[cols];
@@ -29,10 +29,11 @@ static inline const hg_real *add_rows(hg_pair *sum, const hg_real *first, const 
 
 static inline hg_acc add_row(hg_acc sum, const hg_real *row, const hg_real *x, uint8_t cols)
 {
+    hg_acc total = sum;
     for (uint8_t j = 0U; j < cols; j++) {
-        sum = hg_acc_mac(sum, row[j], x[j]);
+        total = hg_acc_mac(total, row[j], x[j]);
     }
-    return sum;
+    return total;
 }
 
 void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, const hg_real *y, hg_real *out)
@@ -42,7 +43,7 @@ void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, c
     const uint8_t rows = m->rows;
     uint8_t i = 0U;
     while ((uint8_t)(i + 1U) < rows) {
-        hg_pair sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
+        hg_rows sum = {.first = hg_acc_zero(), .second = hg_acc_zero()};
         a = add_rows(&sum, a, x, m->cols);
         b = add_rows(&sum, b, y, n->cols);
         out[i] = hg_acc_real(sum.first, m->exponent);

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from cantools.database.can import Database, Message
 from host_support import REALS
-from hullguard.codegen import emit_c, emit_dbc, write_all
+from hullguard.codegen import emit_c, emit_config, emit_dbc, write_all
 from hullguard.codegen.c import fill, real
 from hullguard.codegen.dbc import short
 from hullguard.codegen.names import LIBRARY
@@ -601,6 +601,7 @@ def test_shipped_files_are_those_of_the_shipped_models(name: str) -> None:
     assert (MODELS / f"{name}.h").read_text(encoding="ascii") == header
     assert (MODELS / f"{name}.c").read_text(encoding="ascii") == source
     assert (MODELS / f"{name}.dbc").read_text(encoding="ascii") == emit_dbc(made)
+    assert (MODELS / f"{name}_config.h").read_text(encoding="ascii") == emit_config(made)
     for suffix, text in zip((".h", ".c"), emit_uio(made) if made.uios else (), strict=False):
         assert (MODELS / f"{name}_uio{suffix}").read_text(encoding="ascii") == text
         assert max(map(len, text.splitlines())) <= 140 and not re.search(r"[ \t]$", text, re.MULTILINE) and made.model.sha256 in text
@@ -615,7 +616,7 @@ def test_a_model_called_like_a_header_of_the_library_is_refused(designs: dict[st
 
 def test_files_are_written_only_when_they_change(designs: dict[str, Design], tmp_path: Path) -> None:
     d = designs["tank"]
-    assert [p.name for p in write_all(d, tmp_path)] == ["tank.h", "tank.c", "tank.dbc"]
+    assert [p.name for p in write_all(d, tmp_path)] == ["tank.h", "tank.c", "tank_config.h", "tank.dbc"]
     before = {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
     assert write_all(d, tmp_path) == ()
     assert {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()} == before
@@ -698,6 +699,24 @@ def test_too_small_a_limit_is_an_error_that_names_it(designs: dict[str, Design],
     failed = subprocess.run([*command, f"-D{limit}={least - 1}U"], capture_output=True, text=True, check=False)
     assert failed.returncode != 0
     assert f"model tank needs {limit} of at least {least}" in failed.stderr
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in SHIPPED.glob("*.toml") if not p.stem.endswith(".design")))
+def test_a_config_is_what_its_model_needs_and_no_more(name: str, tmp_path: Path) -> None:
+    """The model compiles with its config; with any option of it less, or a part less, it does not, and says which."""
+    text = (MODELS / f"{name}_config.h").read_text(encoding="ascii")
+    options = re.findall(r"^#define (HG_\w+) (\d+)U?$", text, re.MULTILINE)
+    header = (ROOT / "firmware/include/hullguard/config.h").read_text(encoding="ascii")
+    assert {macro for macro, _ in options} == set(re.findall(r"^#define (HG_(?:WITH_\w+|\w+_MAX)) ", header, re.MULTILINE))
+    command = ["gcc", *WARNINGS, f"-I{ROOT}/firmware/include", f"-I{tmp_path}", f"-I{MODELS}", "-DHG_CONFIG_HEADER=\"used.h\"", "-fsyntax-only", str(MODELS / f"{name}.c")]
+    used = tmp_path / "used.h"
+    used.write_text(text, encoding="ascii")
+    subprocess.run(command, check=True)
+    for macro, value in options:
+        if int(value) > (0 if macro.startswith("HG_WITH_") else 1):
+            used.write_text(re.sub(rf"{macro} {value}", f"{macro} {int(value) - 1}", text), encoding="ascii")
+            failed = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert failed.returncode != 0 and f"model {name} needs {macro}" in failed.stderr
 
 
 Numbers = list[tuple[str, float]]
