@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from exact import series
-
 from hullguard.core.library import library
-from hullguard.core.native import REST, Batch, Native
+from hullguard.core.native import Batch, Native
 from hullguard.core.native_uio import Uio, UioTable
 from hullguard.design.design import Design, design
 from hullguard.design.uio_generator import uio_table
@@ -117,7 +116,8 @@ def forces(cases: Cases, classes: str, force_n: float, runs: int, asked: bool) -
     for roughness in classes:
         found = [cases.run(roughness, 20000 + i, {}, force_n) for i in range(max(1, runs // len(classes)))]
         delay, off = np.array([f[0] for f in found]), max(abs(f[1] / force_n - 1) for f in found)
-        rows.append(Row(f"class {roughness}: {force_n:g} N found after", f"{delay.max():.3f} s at most, {np.median(delay):.3f} s mostly", bool(delay.max() <= FOUND_S) if asked else None))
+        good = bool(delay.max() <= FOUND_S) if asked else None
+        rows.append(Row(f"class {roughness}: {force_n:g} N found after", f"{delay.max():.3f} s at most, {np.median(delay):.3f} s mostly", good))
         rows.append(Row(f"class {roughness}: {force_n:g} N read, off by at most", f"{100 * off:.2f} %", off <= READ))
     return rows
 

@@ -5,6 +5,6 @@ suspension-study: lib ## 10 000 s of roads: false alarms, frames, delays, parts 
 	$(PY) tests/suspension/study.py
 
 suspension-short: lib
-	@$(PY) tests/suspension/study.py 12 6 >$(BUILD)/suspension.log 2>&1 || { cat $(BUILD)/suspension.log; exit 1; }
+	@$(PY) tests/suspension/study.py 6 3 >$(BUILD)/suspension.log 2>&1 || { cat $(BUILD)/suspension.log; exit 1; }
 	@echo "  ok  suspension on random roads"
 TEST_PARTS += suspension-short
