@@ -29,7 +29,7 @@ PIECE_S = 250.0  # of quiet road in one go
 FOUND_S, READ, SHARE_MAX, NAMED = 0.2, 0.03, 0.45, 0.95
 BEFORE_S, AFTER_S, SETTLED_S = 2.0, 10.0, 2.0
 OTHER_N = 200.0  # of which the delay is told where another force has to be found
-LIMIT_N = 30.0  # more than the estimate of the default scenario has been seen to reach on quiet roads
+LIMIT_N = 30.0  # about the largest that the estimate of the default scenario gets on quiet roads: experience, no bound
 PARTS = {"spring1": 0.8, "damper1": 0.5}
 ZERO = "actuator1:bias:0@{}"  # tells the emulator when what comes is no false alarm
 
