@@ -117,14 +117,14 @@ def test_an_actuator_that_pushes_is_found(cli: Cli, tmp_path: Path) -> None:
 
 
 def test_a_worn_damper_is_told_from_the_actuator(cli: Cli) -> None:
-    done = cli("run", "suspension", "--bus", "inprocess", "--json", "--samples", 7000, "--fault", "damper1:gain:0.5@2000")
+    done = cli("run", "suspension", "--bus", "inprocess", "--json", "--scenario", "damper", "--samples", 10000)
     found = done.json["isolation"][0]
     assert (found["cause"], found["candidates"]) == ("component", ["damper1"])
     assert found["share"]["damper1"] == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_weaker_tyre_is_another_road(cli: Cli) -> None:
-    done = cli("run", "suspension", "--bus", "inprocess", "--json", "--samples", 2500, "--fault", "tyre1:gain:0.6@1000", "--expect", "quiet")
+    done = cli("run", "suspension", "--bus", "inprocess", "--json", "--samples", 2500, "--fault", "tyre1:gain:0.6@1000", "--expect", "quiet", "--scenario", "tyre")
     assert done.status == 0 and done.json["faults"][0]["detected_at"] is None
 
 

@@ -1,0 +1,10 @@
+# The shipped suspension on random roads. `make test` drives a few seconds, `make suspension-study` 10 000 at each sample rate, which takes half an hour.
+
+.PHONY: suspension-study suspension-short
+suspension-study: lib ## 10 000 s of roads: false alarms, frames, delays, parts named
+	$(PY) tests/suspension/study.py
+
+suspension-short: lib
+	@$(PY) tests/suspension/study.py 6 3 >$(BUILD)/suspension.log 2>&1 || { cat $(BUILD)/suspension.log; exit 1; }
+	@echo "  ok  suspension on random roads"
+TEST_PARTS += suspension-short
