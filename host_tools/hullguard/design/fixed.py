@@ -119,7 +119,7 @@ def _refuse(tables: Tables, where: str) -> None:
     if any(isinstance(g, ModalGeneratorTable) for g in tables.generators):
         raise InputError(f"{where}: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32")
     if any(g.zonotope is not None for g in tables.generators):
-        raise InputError(f"{where}: not for fixed point: the columns of a zonotope have no proven range; set detector.threshold = \"exact\"")
+        raise InputError(f'{where}: not for fixed point: the columns of a zonotope have no proven range; set detector.threshold = "exact"')
     if tables.predictors:
         name = tables.groups[tables.predictors[0].group].name
         cure = "set detector.prediction = false"
@@ -175,9 +175,7 @@ def _mismatch(m: MismatchTable, units: Array, values: Array, spans: Array, where
     return made, own, radii * MARGIN
 
 
-def _generator(
-    g: GeneratorTable, lin: Linear, given: Given, like: HullTables, signals: _Signals, where: str
-) -> tuple[GeneratorTable, list[int], list[float]]:
+def _generator(g: GeneratorTable, lin: Linear, given: Given, like: HullTables, signals: _Signals, where: str) -> tuple[GeneratorTable, list[int], list[float]]:
     """Tables, units of the residuals, and rounding."""
     place, wide = list(g.signal), list(g.wide)
     v, spans = signals.value[place], signals.span[wide]
@@ -192,9 +190,7 @@ def _generator(
     shown = _exponent(np.abs(output).sum(1) + np.abs(direct).sum(1), where)
     state, inputs = near(state / 2.0**moved), near(inputs / 2.0**moved)
     output, direct = near(output / 2.0**shown), near(direct / 2.0**shown)
-    as_run = Linear(
-        state * 2.0**moved * Z[:, None] / Z, inputs * 2.0**moved * Z[:, None] / V, output * 2.0**shown * R[:, None] / Z, direct * 2.0**shown * R[:, None] / V
-    )
+    as_run = Linear(state * 2.0**moved * Z[:, None] / Z, inputs * 2.0**moved * Z[:, None] / V, output * 2.0**shown * R[:, None] / Z, direct * 2.0**shown * R[:, None] / V)
     _check(as_run, v, Z, R, where)
     t = build(as_run, given, where, Fixed(Z * STEP, R * STEP, like))
     weight, into = t.weight * signals.scale[wide] / R[:, None], t.tail * signals.scale[wide] / R[:, None]
