@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from hullguard.core.library import library
-from hullguard.core.polynomial import JOINT, PLAIN, Case, Levels, Outcome, run
+from hullguard.core.polynomial import DRIFT, JOINT, PLAIN, Case, Levels, Outcome, run
 from hullguard.design.polynomial import Noise, Plant, Tables, atoms, exponential, make, normal, variables
 
 SKEW = 21.0**0.5  # two values -7 and 3 with 0.3 and 0.7 have this standard deviation
 AT = 100  # first faulty sample
 SENSOR: dict[str, Any] = {"fault": "sensor", "fault_at": AT, "size": (0.8,)}  # four standard deviations
+ACTUATOR: dict[str, Any] = {"fault": "actuator", "fault_at": AT, "size": (0.0, 0.08)}  # every sample
 
 
 @dataclass(frozen=True)
@@ -118,15 +119,19 @@ def bounds(study: Study) -> Iterator[Check]:
 
 
 def detection(study: Study) -> Iterator[Check]:
-    """False alarms at kappa = J2 = 4.47, and an abrupt fault of the sensor."""
+    """False alarms at kappa = J2 = 4.47 and at 3 standard deviations of the drift; an abrupt fault of the sensor, a slow one of the actuator."""
     for shape, miss, delay in (("atoms", 0.02, 1.0), ("exp", 0.2, 20.0), ("gauss", 0.02, 1.0)):
         found = study.of(suspension(shape), 2, **SENSOR)
         yield Check(f"E2 {shape}, degree 2: false alarms a sample, plain", found.alarms[PLAIN], 0.0, 0.05)
         yield Check(f"E2 {shape}, degree 2: false alarms a sample, joint", found.alarms[JOINT], 0.0, 0.05)
         yield Check(f"E2 {shape}, degree 2: sensor fault of 4 sigma missed, joint", found.missed(JOINT), 0.0, miss)
         yield Check(f"E2 {shape}, degree 2: samples until it is seen, median, joint", found.delay(JOINT), 0.0, delay)
+        slow = study.of(suspension(shape), 2, **ACTUATOR)
+        yield Check(f"E2 {shape}: false alarms a sample, drift", slow.alarms[DRIFT], 0.0, 0.01)
+        yield Check(f"E2 {shape}: actuator fault missed, drift", slow.missed(DRIFT), 0.0, 0.2)
+        yield Check(f"E2 {shape}: samples until it is seen, median, drift", slow.delay(DRIFT), 0.0, 60.0)
     found = study.of(suspension("atoms"), 2, **SENSOR)
-    yield Check("E2 atoms: the same fault missed, plain (control: Chebyshev's threshold is far off)", found.missed(PLAIN), 0.5, 1.0)
+    yield Check("E2 atoms: the sensor fault missed, plain (control: Chebyshev's threshold is far off)", found.missed(PLAIN), 0.5, 1.0)
 
 
 def events(study: Study) -> Iterator[Check]:
