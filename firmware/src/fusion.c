@@ -6,11 +6,6 @@
 
 #define DEPTH_MAX 14U         /* a stamp modulo 16 names 16 samples, and one of them is the next */
 #define STAMPS 16U
-#if HG_REAL_F64 /* scalings by 4 that take any number to 1 .. 4 */
-#define SCALINGS 540U
-#else
-#define SCALINGS 75U
-#endif
 #define PAST 8U               /* samples before a frame that it can speak of */
 #define PRIOR HG_REAL_C(16.0) /* frames that the loss rate to begin with is worth */
 #define STEPS_MAX HG_REAL_C(32767.0) /* of the origin in one sample: more is no motion but a state that is about to be lost */
@@ -252,29 +247,6 @@ static void predict_slot(const hg_fusion *self, uint8_t lag)
     copy(slot->P, self->P, square(self->config->states));
 }
 
-/* The square root of a positive number: powers of 4 off, which is exact, then Newton's iteration from above. The same on every target. */
-static hg_real root(hg_real x)
-{
-    hg_real scaled = x;
-    hg_real scale = HG_REAL_C(1.0);
-    for (uint16_t i = 0U; i < SCALINGS; i++) {
-        if (scaled >= HG_REAL_C(4.0)) {
-            scaled *= HG_REAL_C(0.25);
-            scale *= HG_REAL_C(2.0);
-        } else if (scaled < HG_REAL_C(1.0)) {
-            scaled *= HG_REAL_C(4.0);
-            scale *= HG_REAL_C(0.5);
-        } else {
-            /* within 1 .. 4, where it stays */
-        }
-    }
-    hg_real y = HG_REAL_C(2.0);
-    for (uint8_t i = 0U; i < 6U; i++) { /* off by at most 1 at first, then by 0.25, 0.025, 3e-4, 5e-8, 1e-15 and rounding */
-        y = HG_REAL_C(0.5) * (y + (scaled / y));
-    }
-    return y * scale;
-}
-
 /* Row of the tables for a sensor's loss rate. */
 static uint16_t rate_row(const hg_fusion *self, uint8_t i)
 {
@@ -312,7 +284,7 @@ static bool pseudo(const hg_fusion *self, const hg_fusion_slot *slot, uint8_t i,
     if (entry->known == HG_FUSION_VALUE) {
         *r = entry->y - row_times(config, i, self->x);
         if ((config->huber > HG_REAL_ZERO) && ((*r * *r) > ((config->huber * config->huber) * s))) {
-            *R = ((hg_real_abs(*r) * root(s)) / config->huber) - p;
+            *R = ((hg_real_abs(*r) * hg_linalg_root(s)) / config->huber) - p;
         }
     } else {
         const hg_real relax = relaxation(self, slot, i, early);

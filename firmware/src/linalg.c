@@ -69,3 +69,36 @@ bool hg_linalg_finite(const hg_real *x, uint16_t n)
     }
     return (defects >= HG_REAL_ZERO) && (defects <= HG_REAL_ZERO); /* false for NaN */
 }
+
+#if HG_REAL_F32 || HG_REAL_F64
+
+#if HG_REAL_F64 /* scalings by 4 that take any number to 1 .. 4 */
+#define SCALINGS 540U
+#else
+#define SCALINGS 75U
+#endif
+
+/* Powers of 4 off, which is exact, then Newton's iteration from above. */
+hg_real hg_linalg_root(hg_real x)
+{
+    hg_real scaled = x;
+    hg_real scale = HG_REAL_C(1.0);
+    for (uint16_t i = 0U; i < SCALINGS; i++) {
+        if (scaled >= HG_REAL_C(4.0)) {
+            scaled *= HG_REAL_C(0.25);
+            scale *= HG_REAL_C(2.0);
+        } else if (scaled < HG_REAL_C(1.0)) {
+            scaled *= HG_REAL_C(4.0);
+            scale *= HG_REAL_C(0.5);
+        } else {
+            /* within 1 .. 4, where it stays */
+        }
+    }
+    hg_real y = HG_REAL_C(2.0);
+    for (uint8_t i = 0U; i < 6U; i++) { /* off by at most 1 at first, then by 0.25, 0.025, 3e-4, 5e-8, 1e-15 and rounding */
+        y = HG_REAL_C(0.5) * (y + (scaled / y));
+    }
+    return y * scale;
+}
+
+#endif

@@ -133,6 +133,17 @@ static void primitives_choose_and_measure(void **state)
     assert_true(hg_real_finite(R(1e-40)));
 }
 
+static void root_is_the_square_root(void **state)
+{
+    (void)state;
+    static const double squares[] = {1e-30, 1e-3, 0.5, 1.0, 2.0, 3.999, 4.0, 49.0, 1e30};
+    for (size_t i = 0U; i < COUNT(squares); i++) {
+        assert_near(1.0, (double)hg_linalg_root(R(squares[i])) / sqrt(squares[i]), 3e-7);
+    }
+    assert_real(8.0, hg_linalg_root(R(64)));
+    assert_true(hg_linalg_root(R(0)) < R(1e-20));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -143,6 +154,7 @@ int main(void)
         cmocka_unit_test(fits_notices_each_contradiction),
         cmocka_unit_test(finite_finds_a_bad_number_at_every_place),
         cmocka_unit_test(primitives_choose_and_measure),
+        cmocka_unit_test(root_is_the_square_root),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,6 +24,7 @@
 #include "hullguard/fusion.h"
 #include "hullguard/variance.h"
 #include "hullguard/consistency.h"
+#include "hullguard/polynomial.h"
 #include "hullguard/e2e.h"
 #include "hullguard/can.h"
 #include "hullguard/frame.h"

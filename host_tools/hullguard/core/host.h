@@ -10,6 +10,7 @@
 
 #if !HG_REAL_Q31
 #include "fusion_run.h"
+#include "polynomial_run.h"
 #endif
 
 #define HGH_STATES_MAX 64
