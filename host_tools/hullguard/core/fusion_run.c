@@ -280,7 +280,7 @@ static void sense(runner *r, int32_t i, int64_t k)
         s->late_counter = s->counter;
         s->previous = received;
     }
-    s->spoken = (uint8_t)((s->spoken << 1) | (speaks ? 1U : 0U));
+    s->spoken = (uint8_t)(((uint32_t)s->spoken << 1) | (speaks ? 1U : 0U));
 }
 
 static void deliver_late(runner *r, int64_t k)
