@@ -25,6 +25,15 @@ typedef struct { /* a configuration and what it points to */
     hg_polynomial self;
 } rig;
 
+/* A test has no more than these; all of them together would not fit a small board. */
+static rig rigs[4];
+
+static rig *fresh(size_t which)
+{
+    memset(&rigs[which], 0, sizeof rigs[which]);
+    return &rigs[which];
+}
+
 static uint8_t degree_of(const monomial *m, uint8_t from, uint8_t to)
 {
     uint8_t sum = 0U;
@@ -66,7 +75,7 @@ static uint16_t find(const monomial *among, uint16_t count, const monomial *want
             return i;
         }
     }
-    fail_msg("no such monomial");
+    assert_true(false); /* no such monomial */
     return 0U;
 }
 
@@ -256,10 +265,10 @@ static void sizes_are_binomials(void **state)
 static void validity_looks_at_every_number_and_table(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 1U, 1U, 2U, true, false);
-    begin(&p);
-    const hg_polynomial_config good = p.config;
+    rig *p = fresh(0U);
+    set_up(p, 1U, 1U, 2U, true, false);
+    begin(p);
+    const hg_polynomial_config good = p->config;
     hg_polynomial_config c = good;
 #define REFUSED(change)                        \
     do {                                       \
@@ -280,56 +289,56 @@ static void validity_looks_at_every_number_and_table(void **state)
     REFUSED(c.weight = R(0));
     REFUSED(c.kappa = R(0));
     REFUSED(c.reach = R(0));
-    REFUSED(p.r[0] = R(0));
-    p.r[0] = R(0.5);
-    REFUSED(p.range[0] = R(0));
-    p.range[0] = R(1000);
-    REFUSED(p.fresh[0] = R(-1));
-    p.fresh[0] = R(0);
-    REFUSED(p.start[1] = 0U; p.start[0] = 1U);
-    p.start[0] = 0U;
+    REFUSED(p->r[0] = R(0));
+    p->r[0] = R(0.5);
+    REFUSED(p->range[0] = R(0));
+    p->range[0] = R(1000);
+    REFUSED(p->fresh[0] = R(-1));
+    p->fresh[0] = R(0);
+    REFUSED(p->start[1] = 0U; p->start[0] = 1U);
+    p->start[0] = 0U;
     c.degree = 4U;
-    assert_status(HG_E_ARGUMENT, hg_polynomial_start(NULL, &good, p.memory, REALS_MAX));
-    assert_status(HG_E_ARGUMENT, hg_polynomial_start(&p.self, NULL, p.memory, REALS_MAX));
-    assert_status(HG_E_ARGUMENT, hg_polynomial_start(&p.self, &good, NULL, REALS_MAX));
-    assert_status(HG_E_CONFIG, hg_polynomial_start(&p.self, &c, p.memory, REALS_MAX));
+    assert_status(HG_E_ARGUMENT, hg_polynomial_start(NULL, &good, p->memory, REALS_MAX));
+    assert_status(HG_E_ARGUMENT, hg_polynomial_start(&p->self, NULL, p->memory, REALS_MAX));
+    assert_status(HG_E_ARGUMENT, hg_polynomial_start(&p->self, &good, NULL, REALS_MAX));
+    assert_status(HG_E_CONFIG, hg_polynomial_start(&p->self, &c, p->memory, REALS_MAX));
 }
 
 static void memory_is_as_long_as_said(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 2U, 2U, 2U, true, true);
-    begin(&p);
+    rig *p = fresh(0U);
+    set_up(p, 2U, 2U, 2U, true, true);
+    begin(p);
     const uint32_t length = hg_polynomial_reals(2U, 2U, 2U, true);
-    assert_status(HG_E_SIZE, hg_polynomial_start(&p.self, &p.config, p.memory, length - 1U));
-    arm(&p.memory[length], REALS_MAX - length);
-    assert_status(HG_OK, hg_polynomial_start(&p.self, &p.config, p.memory, length));
-    assert_status(HG_OK, step(&p, 1.0));
-    assert_untouched(&p.memory[length], REALS_MAX - length);
-    assert_ptr_equal(&p.self.Delta[p.config.measured], &p.memory[length]);
+    assert_status(HG_E_SIZE, hg_polynomial_start(&p->self, &p->config, p->memory, length - 1U));
+    arm(&p->memory[length], REALS_MAX - length);
+    assert_status(HG_OK, hg_polynomial_start(&p->self, &p->config, p->memory, length));
+    assert_status(HG_OK, step(p, 1.0));
+    assert_untouched(&p->memory[length], REALS_MAX - length);
+    assert_true(&p->self.Delta[p->config.measured] == &p->memory[length]);
 }
 
 /* Best estimate of x from 1, y, y^2 with x ~ N(0, 1), y = x + v, E v^2 = R, E v^3 = s: by its normal equations. */
 static void the_third_moment_is_used(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 1U, 1U, 2U, false, false);
-    begin(&p);
+    rig *p = fresh(0U);
+    set_up(p, 1U, 1U, 2U, false, false);
+    begin(p);
     const double P = 1.0, r = 0.5, s = 0.5 * r * sqrt(r), y = 0.75;
     const double S11 = P + r, S12 = s, S22 = 3.0 * P * P + 6.0 * P * r + 3.0 * r * r - S11 * S11;
     const double det = S11 * S22 - S12 * S12, r2 = y * y - S11;
     const double k1 = P * S22 / det, k2 = -P * S12 / det;
-    assert_status(HG_OK, step(&p, y));
-    assert_near(k1 * y + k2 * r2, p.self.x[0], 1e-6);
-    assert_near(P - k1 * P, p.self.Px[0], 1e-6);
-    assert_near(P / S11 * y, p.self.ekf[0], 1e-6);
-    assert_near((S22 * y * y - 2.0 * S12 * y * r2 + S11 * r2 * r2) / det, p.self.judgement.joint, 1e-5);
-    assert_near(y, p.self.judgement.plain, 1e-6);
-    assert_near(4.47 * sqrt(S11), p.self.judgement.threshold, 1e-5);
-    assert_near(0.125 * 0.125 * y * y / S11 * 15.0, p.self.judgement.drift, 1e-6);
-    assert_count(0, p.self.judgement.above);
+    assert_status(HG_OK, step(p, y));
+    assert_near(k1 * y + k2 * r2, p->self.x[0], 1e-6);
+    assert_near(P - k1 * P, p->self.Px[0], 1e-6);
+    assert_near(P / S11 * y, p->self.ekf[0], 1e-6);
+    assert_near((S22 * y * y - 2.0 * S12 * y * r2 + S11 * r2 * r2) / det, p->self.judgement.joint, 1e-5);
+    assert_near(y, p->self.judgement.plain, 1e-6);
+    assert_near(4.47 * sqrt(S11), p->self.judgement.threshold, 1e-5);
+    assert_near(0.125 * 0.125 * y * y / S11 * 15.0, p->self.judgement.drift, 1e-6);
+    assert_count(0, p->self.judgement.above);
 }
 
 /* Degree 1, or normal noise with a linear plant, is the Kalman filter. */
@@ -337,30 +346,30 @@ static void linear_and_normal_is_the_kalman_filter(void **state)
 {
     (void)state;
     for (uint8_t mu = 1U; mu <= 2U; mu++) {
-        static rig p;
+        rig *p = fresh(0U);
         double x = 0.0, P = 1.0;
-        set_up(&p, 1U, 1U, mu, false, false);
-        make_tables(&p);
+        set_up(p, 1U, 1U, mu, false, false);
+        make_tables(p);
         if (mu == 2U) { /* no third moments */
-            for (uint8_t a = 0U; a < p.config.noises; a++) {
-                for (uint8_t b = 0U; b < p.config.noises; b++) {
-                    const monomial both = times(&p.noise_of[a], &p.noise_of[b]);
+            for (uint8_t a = 0U; a < p->config.noises; a++) {
+                for (uint8_t b = 0U; b < p->config.noises; b++) {
+                    const monomial both = times(&p->noise_of[a], &p->noise_of[b]);
                     if ((both.exponent[1] % 2U) != 0U) {
-                        p.covariance[a * p.config.noises + b] = R(0);
+                        p->covariance[a * p->config.noises + b] = R(0);
                     }
                 }
             }
         }
-        assert_status(HG_OK, hg_polynomial_start(&p.self, &p.config, p.memory, REALS_MAX));
+        assert_status(HG_OK, hg_polynomial_start(&p->self, &p->config, p->memory, REALS_MAX));
         for (int k = 0; k < 50; k++) {
             const double y = sin(0.7 * k) + ((k % 3) - 1.0);
             const double K = P / (P + 0.5);
-            assert_status(HG_OK, step(&p, y));
+            assert_status(HG_OK, step(p, y));
             x += K * (y - x);
             P -= K * P;
-            assert_near(x, p.self.x[0], 2e-5);
-            assert_near(P, p.self.Px[0], 2e-5);
-            assert_near(x, p.self.ekf[0], 2e-5);
+            assert_near(x, p->self.x[0], 2e-5);
+            assert_near(P, p->self.Px[0], 2e-5);
+            assert_near(x, p->self.ekf[0], 2e-5);
             x *= 0.5;
             P = 0.25 * P + 0.25;
         }
@@ -371,74 +380,75 @@ static void linear_and_normal_is_the_kalman_filter(void **state)
 static void the_bound_is_wider(void **state)
 {
     (void)state;
-    static rig plain, wide;
-    set_up(&plain, 2U, 1U, 2U, false, true);
-    set_up(&wide, 2U, 1U, 2U, true, true);
-    begin(&plain);
-    begin(&wide);
+    rig *plain = fresh(0U);
+    rig *wide = fresh(1U);
+    set_up(plain, 2U, 1U, 2U, false, true);
+    set_up(wide, 2U, 1U, 2U, true, true);
+    begin(plain);
+    begin(wide);
     for (int k = 0; k < 30; k++) {
         const double y = 0.5 * sin(0.7 * k);
-        assert_status(HG_OK, step(&plain, y));
-        assert_status(HG_OK, step(&wide, y));
-        assert_true(wide.self.Px[0] > plain.self.Px[0]);
-        assert_real(0.0, plain.self.x[1]);
-        assert_real(0.0, plain.self.Px[3]);
+        assert_status(HG_OK, step(plain, y));
+        assert_status(HG_OK, step(wide, y));
+        assert_true(wide->self.Px[0] > plain->self.Px[0]);
+        assert_real(0.0, plain->self.x[1]);
+        assert_real(0.0, plain->self.Px[3]);
     }
-    assert_count(0, wide.self.restarts);
+    assert_count(0, wide->self.restarts);
 }
 
 static void each_statistic_has_its_level(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 1U, 1U, 2U, false, false);
-    begin(&p);
-    assert_status(HG_OK, step(&p, 50.0));
-    assert_count(HG_POLYNOMIAL_PLAIN | HG_POLYNOMIAL_JOINT | HG_POLYNOMIAL_DRIFT, p.self.judgement.above);
-    hg_polynomial_reset(&p.self);
+    rig *p = fresh(0U);
+    set_up(p, 1U, 1U, 2U, false, false);
+    begin(p);
+    assert_status(HG_OK, step(p, 50.0));
+    assert_count(HG_POLYNOMIAL_PLAIN | HG_POLYNOMIAL_JOINT | HG_POLYNOMIAL_DRIFT, p->self.judgement.above);
+    hg_polynomial_reset(&p->self);
     for (int k = 0; k < 40; k++) {
-        assert_status(HG_OK, step(&p, 2.0));
+        assert_status(HG_OK, step(p, 2.0));
     }
-    assert_count(HG_POLYNOMIAL_DRIFT, p.self.judgement.above);
+    assert_count(HG_POLYNOMIAL_DRIFT, p->self.judgement.above);
 }
 
 static void wrong_input_changes_nothing(void **state)
 {
     (void)state;
-    static rig p;
+    rig *p = fresh(0U);
     static hg_real before[REALS_MAX];
-    set_up(&p, 1U, 1U, 2U, false, false);
-    begin(&p);
-    assert_status(HG_OK, step(&p, 0.5));
-    memcpy(before, p.memory, sizeof before);
+    set_up(p, 1U, 1U, 2U, false, false);
+    begin(p);
+    assert_status(HG_OK, step(p, 0.5));
+    memcpy(before, p->memory, sizeof before);
     static const hg_real bad[][2] = {{REAL_NAN, R(0)}, {REAL_INF, R(0)}, {R(1001), R(0)}, {R(1), R(-1)}, {R(1), REAL_NAN}};
     for (size_t i = 0U; i < COUNT(bad); i++) {
-        assert_status(HG_E_NUMERIC, hg_polynomial_step(&p.self, &bad[i][0], &bad[i][1]));
-        assert_memory_equal(before, p.memory, sizeof before);
+        assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, &bad[i][0], &bad[i][1]));
+        assert_memory_equal(before, p->memory, sizeof before);
     }
-    set_up(&p, 1U, 2U, 1U, false, false);
-    begin(&p);
+    set_up(p, 1U, 2U, 1U, false, false);
+    begin(p);
     static const hg_real first[2] = {REAL_NAN, R(1)};
-    assert_status(HG_E_NUMERIC, hg_polynomial_step(&p.self, first, exact));
-    assert_count(0, p.self.restarts);
+    assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, first, exact));
+    assert_count(0, p->self.restarts);
 }
 
 /* Nothing known: prediction alone, the value is not read. */
 static void an_absent_output_is_left_out(void **state)
 {
     (void)state;
-    static rig p;
+    rig *p = fresh(0U);
     static const hg_real y = REAL_NAN, none = REAL_INF;
-    set_up(&p, 1U, 1U, 2U, false, false);
-    begin(&p);
+    set_up(p, 1U, 1U, 2U, false, false);
+    begin(p);
     double P = 1.0;
     for (int k = 0; k < 5; k++) {
-        assert_status(HG_OK, hg_polynomial_step(&p.self, &y, &none));
-        assert_near(0.0, p.self.x[0], 1e-6);
-        assert_near(P, p.self.Px[0], 1e-5);
-        assert_count(0, p.self.judgement.above);
+        assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &none));
+        assert_near(0.0, p->self.x[0], 1e-6);
+        assert_near(P, p->self.Px[0], 1e-5);
+        assert_count(0, p->self.judgement.above);
         P = 0.25 * P + 0.25;
-        assert_near(P, p.self.Pe[0], 1e-5);
+        assert_near(P, p->self.Pe[0], 1e-5);
     }
 }
 
@@ -449,122 +459,124 @@ static void silence_is_worth_its_radius(void **state)
     double last = 0.0;
     static const double radius[] = {0.0, 0.1, 0.3, 1.0, 5.0};
     for (size_t i = 0U; i < COUNT(radius); i++) {
-        static rig p;
-        set_up(&p, 1U, 1U, 2U, false, false);
-        begin(&p);
+        rig *p = fresh(0U);
+        set_up(p, 1U, 1U, 2U, false, false);
+        begin(p);
         const hg_real y = R(0.5), wide = R(radius[i]);
-        assert_status(HG_OK, hg_polynomial_step(&p.self, &y, &wide));
-        assert_true((double)p.self.Px[0] >= last);
-        assert_true((double)p.self.Px[0] <= 1.0);
-        last = (double)p.self.Px[0];
-        assert_near(4.47 * sqrt(1.5) + radius[i], p.self.judgement.threshold, 1e-5);
+        assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &wide));
+        assert_true((double)p->self.Px[0] >= last);
+        assert_true((double)p->self.Px[0] <= 1.0);
+        last = (double)p->self.Px[0];
+        assert_near(4.47 * sqrt(1.5) + radius[i], p->self.judgement.threshold, 1e-5);
         if (i > 0U) { /* the point of expansion does not hear it */
-            assert_near(0.0, p.self.ekf[0], 1e-6);
+            assert_near(0.0, p->self.ekf[0], 1e-6);
         }
     }
     assert_near(1.0, last, 1e-6);
-    static rig p;
-    set_up(&p, 1U, 1U, 2U, false, false);
-    p.fresh[0] = R(0.1);
-    begin(&p);
+    rig *p = fresh(1U);
+    set_up(p, 1U, 1U, 2U, false, false);
+    p->fresh[0] = R(0.1);
+    begin(p);
     const hg_real y = R(0.5), within = R(0.1);
-    assert_status(HG_OK, hg_polynomial_step(&p.self, &y, &within));
-    assert_near(0.5 / 1.5, p.self.ekf[0], 1e-6);
-    assert_near(4.47 * sqrt(1.5), p.self.judgement.threshold, 1e-5);
+    assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &within));
+    assert_near(0.5 / 1.5, p->self.ekf[0], 1e-6);
+    assert_near(4.47 * sqrt(1.5), p->self.judgement.threshold, 1e-5);
 }
 
 /* Two outputs: one measured, the other silent and then unknown. Powers with an output that is left out are left out too. */
 static void outputs_are_left_out_one_by_one(void **state)
 {
     (void)state;
-    static rig both, one, none;
+    rig *both = fresh(0U);
+    rig *one = fresh(1U);
+    rig *none = fresh(2U);
     static const hg_real y[2] = {R(0.5), R(0.25)};
     static const hg_real small[2] = {R(0), R(0.01)}, unknown[2] = {R(0), REAL_INF};
-    rig *const all[] = {&both, &one, &none};
+    rig *const all[] = {both, one, none};
     const hg_real *const radius[] = {exact, small, unknown};
     for (size_t i = 0U; i < 3U; i++) {
         set_up(all[i], 1U, 2U, 2U, false, false);
         begin(all[i]);
         assert_status(HG_OK, hg_polynomial_step(&all[i]->self, y, radius[i]));
     }
-    assert_true(both.self.Px[0] < one.self.Px[0]);
-    assert_true(one.self.Px[0] < none.self.Px[0]);
-    static rig single;
-    set_up(&single, 1U, 1U, 2U, false, false);
-    begin(&single);
-    assert_status(HG_OK, hg_polynomial_step(&single.self, y, exact));
-    assert_near(single.self.x[0], none.self.x[0], 1e-6);
-    assert_near(single.self.Px[0], none.self.Px[0], 1e-6);
+    assert_true(both->self.Px[0] < one->self.Px[0]);
+    assert_true(one->self.Px[0] < none->self.Px[0]);
+    rig *single = fresh(3U);
+    set_up(single, 1U, 1U, 2U, false, false);
+    begin(single);
+    assert_status(HG_OK, hg_polynomial_step(&single->self, y, exact));
+    assert_near(single->self.x[0], none->self.x[0], 1e-6);
+    assert_near(single->self.Px[0], none->self.Px[0], 1e-6);
 }
 
 /* Two outputs without noise that say the same: the second is left out, and what remains is right. */
 static void a_component_that_says_nothing_new_is_dropped(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 1U, 2U, 1U, false, false);
-    p.r[0] = R(1e-13);
-    p.r[1] = R(1e-13);
-    begin(&p);
+    rig *p = fresh(0U);
+    set_up(p, 1U, 2U, 1U, false, false);
+    p->r[0] = R(1e-13);
+    p->r[1] = R(1e-13);
+    begin(p);
     for (int k = 0; k < 5; k++) {
-        assert_status(HG_OK, step(&p, 0.5));
-        assert_near(0.5, p.self.x[0], 1e-5);
-        assert_true(p.self.Px[0] >= R(0));
+        assert_status(HG_OK, step(p, 0.5));
+        assert_near(0.5, p->self.x[0], 1e-5);
+        assert_true(p->self.Px[0] >= R(0));
     }
-    assert_count(10, p.self.dropped); /* of the auxiliary filter and of this, each sample */
-    p.self.dropped = UINT16_MAX;
-    assert_status(HG_OK, step(&p, 0.5));
-    assert_count(UINT16_MAX, p.self.dropped);
+    assert_count(10, p->self.dropped); /* of the auxiliary filter and of this, each sample */
+    p->self.dropped = UINT16_MAX;
+    assert_status(HG_OK, step(p, 0.5));
+    assert_count(UINT16_MAX, p->self.dropped);
 }
 
 /* Tables that are no covariance: an update that would leave a negative variance is not made. */
 static void an_update_to_no_covariance_is_not_made(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 2U, 1U, 1U, false, false);
-    make_tables(&p);
-    p.covariance[1 * 4 + 3] = R(-5);
-    p.covariance[3 * 4 + 1] = R(-5);
-    assert_status(HG_OK, hg_polynomial_start(&p.self, &p.config, p.memory, REALS_MAX));
-    assert_status(HG_OK, step(&p, 0.5));
-    assert_count(1, p.self.held);
-    assert_real(0.0, p.self.x[0]);
-    assert_real(1.0, p.self.Px[0]);
-    assert_near(11.0 / 3.0, p.self.P[0], 1e-5); /* Jxx: (1/6)^2 P + (1/3)^2 R + Q + 2 (1/3) 5 */
+    rig *p = fresh(0U);
+    set_up(p, 2U, 1U, 1U, false, false);
+    make_tables(p);
+    p->covariance[1 * 4 + 3] = R(-5);
+    p->covariance[3 * 4 + 1] = R(-5);
+    assert_status(HG_OK, hg_polynomial_start(&p->self, &p->config, p->memory, REALS_MAX));
+    assert_status(HG_OK, step(p, 0.5));
+    assert_count(1, p->self.held);
+    assert_real(0.0, p->self.x[0]);
+    assert_real(1.0, p->self.Px[0]);
+    assert_near(11.0 / 3.0, p->self.P[0], 1e-5); /* Jxx: (1/6)^2 P + (1/3)^2 R + Q + 2 (1/3) 5 */
 }
 
 /* Nor one for the estimate: P itself is none. */
 static void an_estimate_with_no_covariance_is_not_made(void **state)
 {
     (void)state;
-    static rig p;
-    set_up(&p, 1U, 1U, 1U, false, false);
-    begin(&p);
-    p.self.P[0] = R(-0.25);
-    assert_status(HG_OK, step(&p, 0.5));
-    assert_count(1, p.self.held);
-    assert_true(p.self.Px[0] >= R(0));
+    rig *p = fresh(0U);
+    set_up(p, 1U, 1U, 1U, false, false);
+    begin(p);
+    p->self.P[0] = R(-0.25);
+    assert_status(HG_OK, step(p, 0.5));
+    assert_count(1, p->self.held);
+    assert_true(p->self.Px[0] >= R(0));
 }
 
 static void a_state_that_is_none_begins_again(void **state)
 {
     (void)state;
-    static rig p;
+    rig *p = fresh(0U);
     static const hg_real y = R(0), none = REAL_INF;
-    set_up(&p, 1U, 1U, 2U, false, true);
-    p.f[1] = R(1e30);
-    p.x0[0] = R(2);
-    begin(&p);
+    set_up(p, 1U, 1U, 2U, false, true);
+    p->f[1] = R(1e30);
+    p->x0[0] = R(2);
+    begin(p);
     hg_status status = HG_OK;
     for (int k = 0; (k < 20) && (status == HG_OK); k++) {
-        status = hg_polynomial_step(&p.self, &y, &none);
+        status = hg_polynomial_step(&p->self, &y, &none);
     }
     assert_status(HG_E_NUMERIC, status);
-    assert_count(1, p.self.restarts);
-    assert_real(2.0, p.self.c[0]);
-    assert_real(1.0, p.self.Pe[0]);
-    assert_count(0, p.self.judgement.above);
+    assert_count(1, p->self.restarts);
+    assert_real(2.0, p->self.c[0]);
+    assert_real(1.0, p->self.Pe[0]);
+    assert_count(0, p->self.judgement.above);
 }
 
 int main(void)
