@@ -265,7 +265,7 @@ def test_json_tells_the_same(made: Design, facts: list[BankFacts]) -> None:
 
 
 def test_isolability_is_looked_into_on_demand(cli: Cli, tmp_path: Path) -> None:
-    plain = ("design", "platoon", "--set", "detector.observers.0.search.trials=1", "--set", "plant.vehicles=2", "--out", tmp_path, "--json")
+    plain = ("design", "platoon", "--set", "detector.observers.0.search.trials=5", "--set", "plant.vehicles=2", "--out", tmp_path, "--json")
     assert cli(*plain).json["isolability"] is None
     pairs = cli(*plain, "--isolability").json["isolability"]
     assert {(p["fault"], p["hypothesis"]) for p in pairs} >= {("controller1", "controller2"), ("controller2", "controller1")}

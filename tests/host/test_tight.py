@@ -208,15 +208,15 @@ def test_no_held_value_brings_a_residual_over_its_threshold_after_a_lost_frame_h
 
 # ---- libraries that are wrong on purpose ----
 
-NO_SILENCE = {"hold.c": [("held && (!self->lost) && (self->age > silence(self));", "held && (!self->lost) && (silence(self) < 255U);")]}
+NO_SILENCE = {"hold.c": [("held && (!self->lost) && (self->age > self->silence)", "held && (!self->lost) && (self->silence < 255U)")]}
 NO_REWRITING = {"detector.c": [("hg_hold_past(&self->memory.hold[group], lag, &row[first]);", "(void)first;")]}
 NO_REWIND = {"hold.c": [("*rewind = (newly_lost || (self->fresh && self->gap)) ? (uint8_t)(self->gap_age - 1U) : 0U;", "*rewind = 0U; (void)newly_lost;")]}
 NO_CANCEL = {"decision.c": [("((alarm->pending & evidence->rewound) != 0U)", "false")]}
 SMALL_J = {
     "hull.c": [
         (
-            "return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(all, config->exponent)), theta), HG_REAL_MAX);",
-            "return hg_real_mul(HG_REAL_C(0.93), hg_real_add(hg_real_add(bias, hg_acc_real(all, config->exponent)), theta));",
+            "return hg_real_min(hg_real_add(hg_real_add(bias, hg_acc_real(total, config->exponent)), self->theta[i]), HG_REAL_MAX);",
+            "return hg_real_mul(HG_REAL_C(0.93), hg_real_add(hg_real_add(bias, hg_acc_real(total, config->exponent)), self->theta[i]));",
         )
     ]
 }
