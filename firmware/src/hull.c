@@ -98,6 +98,16 @@ static inline const hg_real *add_signal(hg_sums *sum, hg_sums *tail, const hg_re
     return add_radius(tail, next, *radius, two);
 }
 
+/* The same of all signals. */
+static inline const hg_real *add_signals(hg_sums *sum, hg_sums *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
+{
+    const hg_real *next = weight;
+    for (uint8_t g = 0U; g < config->width; g++) {
+        next = add_signal(sum, tail, next, ring, config->signal[g], config->taps[g], two);
+    }
+    return next;
+}
+
 /* What the initial state and the disturbances add at this sample; what is left of the initial state goes over into theta. */
 static const hg_real *bias_step(hg_hull *self)
 {
@@ -117,17 +127,7 @@ static const hg_real *bias_step(hg_hull *self)
     return bias;
 }
 
-/* The same of all signals. */
-static inline const hg_real *add_signals(hg_sums *sum, hg_sums *tail, const hg_real *weight, const hg_ring *ring, const hg_hull_config *config, bool two)
-{
-    const hg_real *next = weight;
-    for (uint8_t g = 0U; g < config->width; g++) {
-        next = add_signal(sum, tail, next, ring, config->signal[g], config->taps[g], two);
-    }
-    return next;
-}
-
-/* The same of the modes. */
+/* What lies behind the taps moves on by one sample, mode by mode. */
 static void move_modes(hg_hull *self, const hg_ring *ring)
 {
     const hg_hull_config *config = self->config;
@@ -143,7 +143,7 @@ static void move_modes(hg_hull *self, const hg_ring *ring)
     }
 }
 
-/* The bound on all lags behind the taps moves on by one sample. Returns J, to which the modes are added. */
+/* The same of one residual. Returns J, to which the modes are added. */
 static hg_real finish(hg_hull *self, uint8_t i, hg_acc sum, hg_acc leaving, hg_real bias)
 {
     const hg_hull_config *config = self->config;

@@ -313,7 +313,7 @@ def finish(model: Model, stored: Stored) -> Design:
 def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables) -> tuple[Tables, tuple[float, ...]]:
     """The tables with those for fixed point, or with the reason why there are none; and what rounding costs there, in residual units."""
     try:
-        made = lower(tables, tuple(g.linear for g in generators), tuple(g.given for g in generators), tuple(g.tables for g in generators), model.path.name)
+        made = lower(tables, tuple(g.linear for g in generators), tuple(g.given for g in generators if g.given is not None), tuple(g.tables for g in generators), model.path.name)
     except InputError as reason:
         return replace(tables, not_fixed=str(reason)), ()
     return replace(tables, fixed=made.tables), made.rounding

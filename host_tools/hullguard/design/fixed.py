@@ -68,14 +68,13 @@ def _exponent(sums: Array, what: str) -> int:
     return exponent
 
 
-def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given | None, ...], hulls: tuple[HullTables, ...], where: str) -> FixedDesign:
-    """A design's tables in fixed point; refuses what has no range that holds for any data."""
+def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], hulls: tuple[HullTables, ...], where: str) -> FixedDesign:
+    """A design's tables in fixed point; refuses what has no range that holds for any data, unknown-input observers among them, which have nothing `given`."""
     _refuse(tables, where)
     groups = tuple(_group(g, where) for g in tables.groups)
     sent = [s for g in groups for s in g.signals]
-    plain = [s for g in tables.groups for s in g.signals]
-    values = np.array([_largest(s) for s in plain])
-    spans = np.array([s.span * 2.0**t.unit for s, t in zip(sent, sent, strict=True)])
+    values = np.array([_largest(s) for g in tables.groups for s in g.signals])
+    spans = np.array([s.span * 2.0**s.unit for s in sent])
     units = np.array([s.unit for s in sent])
     mismatch = None
     if tables.mismatch is not None:
@@ -86,10 +85,7 @@ def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given | None,
     rounding: list[float] = []
     generators = []
     for i, g in enumerate(tables.generators):
-        own = given[i]
-        if own is None:
-            raise InputError(f"{where}: not for fixed point: detector.observers[{i}] is an unknown-input observer; use float32")
-        made, unit, lost = _generator(g, linear[i], own, hulls[i], _Signals(scale, values, spans), f"{where}: detector.observers[{i}]")
+        made, unit, lost = _generator(g, linear[i], given[i], hulls[i], _Signals(scale, values, spans), f"{where}: detector.observers[{i}]")
         generators.append(made)
         residual_units += unit
         rounding += lost
