@@ -1,6 +1,6 @@
 # hullguard. Everything that is built goes to $(BUILD); sources are found by wildcards, so that a new file needs no line here.
-# V=1 shows the commands. A folder may add targets of its own in a *.mk file (see the include at the end), and parts of `make test` by
-# TEST_PARTS += NAME. A target with a ## comment shows up in `make help`.
+# V=1 shows the commands. A folder may add targets of its own in a *.mk file (see the include at the end), parts of `make test` by
+# TEST_PARTS += NAME and parts of `make check` by CHECK_PARTS += NAME. A target with a ## comment shows up in `make help`.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -34,10 +34,11 @@ CC_gcc     = $(CC) $(OPTIMISE)
 CC_asan    = $(CC) $(SANITIZE),address
 CC_clang   = $(CLANG) $(OPTIMISE)
 
-# Unit tests that are for one build alone: fixed point, and a library without what a model may do without.
+# Unit tests that are for one build alone: fixed point, and a library without what a model may do without. And those that no number type has a part in.
 UNIT_BUILDS     := q31 bare
 UNIT_TESTS_q31  := test_q31
 UNIT_TESTS_bare := test_bare
+UNIT_ONCE       := test_e2e_errors
 REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH)
 
 LIB_SRC     := $(wildcard firmware/src/*.c)
@@ -51,6 +52,7 @@ RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig
 
 OBJECTS :=
 TEST_PARTS := lib
+CHECK_PARTS := lib
 
 # --- what to run ---------------------------------------------------------------------------------------------------------------------
 
@@ -65,11 +67,17 @@ setup-test: ## the same for the tests
 	@host_tools/setup.sh test
 
 # The parts start after the set-up, in a make of their own, because they may need what it installs.
-.PHONY: test
-test: ## set up all that is needed, build, run every test
+parts = $(MAKE) $(if $(filter --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc)) -Otarget
+
+.PHONY: test check
+test: ## set up all that is needed, build, test the library and the host tools
 	@host_tools/setup.sh test
-	@$(MAKE) $(if $(filter --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc)) -Otarget $(TEST_PARTS)
+	@+$(parts) $(TEST_PARTS)
 	@echo "all tests passed: $(TEST_PARTS)"
+check: ## the same for what takes other processors: targets, emulated boards, faulty frames, sizes; and coverage
+	@host_tools/setup.sh test
+	@+$(parts) $(CHECK_PARTS)
+	@echo "all checks passed: $(CHECK_PARTS)"
 
 .PHONY: clean
 clean: ## remove what was built (not .venv)
@@ -125,7 +133,7 @@ run_test = timeout --foreground -k 5 300 $(1) >$(2).log 2>&1 && touch $(2).ok &&
 # The tables of the models are floats; models that need an optional part do not compile without it.
 $(foreach r,$(FLOATS),$(eval UNIT_MODELS_$(r) := $(MODEL_SRC)))
 UNIT_MODELS_bare := $(filter-out $(patsubst %.h,%.c,$(shell grep -l '^.if !HG_WITH_' firmware/models/*.h)),$(MODEL_SRC))
-unit_tests = $(or $(UNIT_TESTS_$(1)),$(UNIT_TESTS))
+unit_tests = $(or $(UNIT_TESTS_$(1)),$(if $(filter f64,$(1)),$(filter-out $(UNIT_ONCE),$(UNIT_TESTS)),$(UNIT_TESTS)))
 unit_src   = $(LIB_SRC) $(UNIT_MODELS_$(1)) $(HOST_HAL_SRC)
 
 define unit_variant

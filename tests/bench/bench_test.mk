@@ -5,7 +5,7 @@ KNOWN_F := $(BENCH)/$(KNOWN)-f32
 PAINTED := cortex_m4f rv32imac
 
 .PHONY: bench-test
-TEST_PARTS += bench-test
+CHECK_PARTS += bench-test
 bench-test: $(KNOWN_F)/known.elf $(PAINTED:%=$(BENCH)/%-f32/platoon/painted.elf) $(BENCH)/x86_64-f32/platoon/drive.elf \
             $(KNOWN_F)/platoon/detector.elf $(BENCH)/count.so ## tests of make size and make bench
 	@PYTHONPATH=tests/bench:host_tools BENCH_PAINTED='$(foreach t,$(PAINTED),$(t)=$(CROSS_$(t))=$(RUN_$(t));)' BENCH_KNOWN='$(CROSS_$(KNOWN))=$(RUN_$(KNOWN))' \

@@ -4,7 +4,7 @@
 
 SIZE_PARTS := detector node sensor
 
-# The part of it in `make test`: two instruction sets, with an FPU and without.
+# The part of it in `make check`: two instruction sets, with an FPU and without.
 SIZE_QUICK := cortex_m4f rv32imac
 
 size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(filter-out $(NOT_$(r)),$(MODELS)),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
@@ -12,7 +12,7 @@ size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
 size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '$(call size_cross,$(1))' $(2) $(call size_elfs,$(1))
 
 .PHONY: size size-quick size-budget
-TEST_PARTS += size-quick
+CHECK_PARTS += size-quick
 size: $(call size_elfs,$(TARGETS)) ## flash, RAM and worst-case stack, beside their budget (JSON=1; FORMAT=markdown: of MODEL, short)
 	@$(call size_run,$(TARGETS),$(if $(JSON),--json) $(if $(FORMAT),--format $(FORMAT) --model $(MODEL)))
 size-quick: $(call size_elfs,$(SIZE_QUICK)) ## the same of a few targets

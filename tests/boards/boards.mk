@@ -1,5 +1,5 @@
 # Detector nodes on emulated boards: the same frames to the board, to the Linux node and to one in process, and the same answers; the tests of a node
-# on a bus (tests/node/bus_inside.py), which the Linux node passes as well; and a sensor node, whose frames are those of the host's sender. `make test`
+# on a bus (tests/node/bus_inside.py), which the Linux node passes as well; and a sensor node, whose frames are those of the host's sender. `make check`
 # makes a few hundred samples of each board and the quick ones of those tests, `make boards` 10 000 in one boot and all of them.
 
 BOARD_NAMES := ctucan zynqmp_r5
@@ -23,7 +23,7 @@ boards-node: $(BOARDS_BUILT) ## the tests of a node on a bus, on emulated boards
 boards-short: $(BOARDS_BUILT)
 	@PYTHONPATH=host_tools $(WITH_VCAN) -m $(BOARD_GUEST) -n 2 -t 400 $(PY) tests/boards/short_inside.py $(abspath $(BOARDS)/out) >$(BOARDS)/short.log 2>&1 || { cat $(BOARDS)/short.log; exit 1; }
 	@grep '^  ok  ' $(BOARDS)/short.log
-TEST_PARTS += boards-short
+CHECK_PARTS += boards-short
 
 # The contract suite of every HAL on the board itself.
 define board_contract
@@ -37,7 +37,7 @@ boards-contract: boards-images
 	@for b in $(BOARD_NAMES); do \
 	  PYTHONPATH=host_tools $(PY) tests/boards/contract_run.py $$b >$(BOARDS)/$$b-contract.log 2>&1 || { cat $(BOARDS)/$$b-contract.log; exit 1; }; \
 	  echo "  ok  contract on board $$(tail -n 1 $(BOARDS)/$$b-contract.log)"; done
-TEST_PARTS += boards-contract
+CHECK_PARTS += boards-contract
 
 # The same suite on the host, against models of the registers: the drivers as they are for silicon, and errors, which no emulator makes.
 MODEL_DRIVER_ctucan := hal/ctucan/ctucan.c

@@ -1,4 +1,4 @@
-"""short_inside.py OUT: what `make test` runs of boards, where vcan0 and vcan1 exist: some hundred samples of each, a sensor node, and the quick part of the
+"""short_inside.py OUT: what `make check` runs of boards, where vcan0 and vcan1 exist: some hundred samples of each, a sensor node, and the quick part of the
 node's tests. In one process, because a guest and the start of Python take longer than most of it."""
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # Faulty frames of every action: in process under AddressSanitizer and UBSan, and on vcan against a node that is a process of its own (UBSan: the
-# shadow memory of AddressSanitizer does not fit into a guest). `make test` makes few of them, `make faulty` 10^6 and 10^5.
+# shadow memory of AddressSanitizer does not fit into a guest). `make check` makes few of them, `make faulty` 10^6 and 10^5.
 
 FAULTY_RUNS := 170
 FAULTY_OPTIONS := --inject all --samples 300 --scenario manoeuvres --fault controller1:bias:2@120
@@ -37,4 +37,4 @@ faulty-short: lib $(FAULTY_BUILT)
 	@$(call faulty_run,2,--quiet) && echo "  ok  faulty frames, sanitized"
 	@$(call faulty_vcan,2000,5) >$(BUILD)/faulty/vcan.log 2>&1 || { cat $(BUILD)/faulty/vcan.log; exit 1; }
 	@tail -n 1 $(BUILD)/faulty/vcan.log | sed 's/^/  ok  /'
-TEST_PARTS += faulty-short
+CHECK_PARTS += faulty-short

@@ -27,7 +27,7 @@ from under_test import Linux, Mode, Running, Under, nodes, under
 
 ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG = 0x20000000, 0x80000000, 0x40000000
 BUS_OFF, RESTARTED, CONTROLLER, PASSIVE, WARNING = 0x40, 0x100, 0x04, 0x30, 0x0C
-quick = pytest.mark.quick  # part of `make test` on boards, too
+quick = pytest.mark.quick  # part of `make check` on boards, too
 
 
 @pytest.fixture(scope="session", params=nodes())

@@ -16,7 +16,7 @@ _started: list[tuple[subprocess.Popen[str], Path]] = []
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "quick: of bus_inside.py, what `make test` runs on boards")
+    config.addinivalue_line("markers", "quick: of bus_inside.py, what `make check` runs on boards")
 
 
 def pytest_report_header() -> str:

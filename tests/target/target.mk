@@ -16,7 +16,7 @@ UNIT_TARGETS := $(foreach t,$(RUN_TARGETS),$(if $(filter-out none,$(LIBC_$(t))),
 UNIT_LARGE_cortex_m0 := test_adversary test_bank test_fusion test_hold test_linalg test_mismatch test_node test_polynomial test_ring test_robust test_zonotope
 UNIT_BOARD_cortex_m0 := cortex_m3
 
-# These take 7 to 60 s on each target. `make test` runs the others, on the smallest core, on one with an FPU and on the big-endian one, beside
+# These take 7 to 60 s on each target. `make check` runs the others, on the smallest core, on one with an FPU and on the big-endian one, beside
 # images and corpus of all; `make target-tests` runs all on all.
 UNIT_SLOW  := test_adversary test_e2e_errors test_robust test_zonotope
 CORPUS_QUICK := $(filter-out $(patsubst %,%-q31,cortex_m3 cortex_m33 cortex_m7 cortex_r5f rv32imafc),$(RUN_BUILDS))# theirs are the instructions of the others
@@ -47,9 +47,9 @@ unit_board     = $(if $(filter $(notdir $(2)),$(UNIT_LARGE_$(1))),$(UNIT_BOARD_$
 target_run     = QEMU_AUDIO_DRV=none timeout --foreground -k 5 900 $(RUN_$(1)) $(2) </dev/null
 
 .PHONY: target-tests target-quick target-image target-corpus target-node target-unit
-TEST_PARTS += target-quick
+CHECK_PARTS += target-quick
 target-tests: target-image target-corpus target-node target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
-target-quick: target-image $(CORPUS_QUICK:%=$(TARGET_TESTS)/%/corpus.ok) target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make test`
+target-quick: target-image $(CORPUS_QUICK:%=$(TARGET_TESTS)/%/corpus.ok) target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make check`
 target-image: $(BUILDS:%=$(FIRMWARE)/%/image.ok)
 target-corpus: $(RUN_BUILDS:%=$(TARGET_TESTS)/%/corpus.ok)
 target-node: $(RUN_BUILDS:%=$(TARGET_TESTS)/%/node.ok)
