@@ -4,6 +4,7 @@ the ends of all ranges; what has no fixed-point form says so; and a wrong roundi
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -420,6 +421,18 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], str, str]] = {
     "float32": ("platoon", ("signals.0.wire=float32", "groups.0.frame.fd=true"), "a float32 on the wire", "integer field"),
     "unknown inputs": ("suspension", (), "modes of its thresholds", "use float32"),
 }
+
+
+def test_the_commands_run_in_fixed_point(cli: Cli, tmp_path: Any) -> None:
+    done = cli("run", "platoon", "--bus", "inprocess", "--real", "q31", "--expect", "detect", "--out", tmp_path, "--json")
+    assert done.status == 0, done.err
+    made = json.loads(done.out)
+    assert made["real"] == "q31" and made["false_alarms"] == {"provisional": 0, "confirmed": 0}
+    assert made["frames"]["periodic"] == 2 * made["samples"]
+    again = cli("detect", "platoon", "--log", tmp_path / "run.log", "--rest", "--lockstep", "--real", "q31", "--json")
+    assert again.status == 0, again.err
+    assert json.loads(again.out)["verdicts"] == made["verdicts"]
+    assert cli("campaign", "platoon", "--runs", 2, "--real", "q31", "--json").status == 0
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -45,7 +45,7 @@ class Native:
     """The constant structures of one model, and the memory they lie in."""
 
     def __init__(self, library: Library, tables: Tables) -> None:
-        if library.real == "q31":
+        if library.real == "q31" and not tables.units:  # with units they are in fixed point already
             if tables.fixed is None:
                 raise InputError(tables.not_fixed)
             tables = tables.fixed
