@@ -15,6 +15,10 @@ models: lib ## generate firmware/models/ from host_tools/models/ again
 	@for m in $(SHIPPED); do $(HULLGUARD) design $$m --quiet --out $(BUILD)/models/$$m || exit 1; \
 	  cp $(BUILD)/models/$$m/$$m*.h $(BUILD)/models/$$m/$$m*.c $(BUILD)/models/$$m/$$m.dbc firmware/models/; echo "  ok  $$m"; done
 
+.PHONY: amalgam
+amalgam: lib ## the library with MODEL's tables (platoon) as two files: build/hullguard.h and build/hullguard.c
+	@$(HULLGUARD) amalgam $(MODEL) --out $(BUILD)
+
 .PHONY: openacc
 openacc: ## the openacc model on a recorded drive: make openacc DATA=FILE.csv
 	@host_tools/setup.sh demo

@@ -200,6 +200,11 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--dbc", metavar="FILE", help="what the frames mean, for a .csv")
     _output(p)
 
+    p = add("amalgam", "the C library and the tables of chosen models as two files, hullguard.h and hullguard.c")
+    p.add_argument("models", nargs="+", metavar="MODEL", help="name of a shipped model, or path of a model file; more than one live in one image")
+    p.add_argument("--out", metavar="DIR", default="build", help="folder for the two files (default build)")
+    _output(p)
+
     p = add("inject", "faults on a bus, tapped or between two channels, or in a log")
     p.epilog = f"{inject.SPEC}\n{STATUS}"
     inject.add_arguments(p, _seed)
@@ -214,6 +219,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
+    from hullguard.codegen.amalgam import run_amalgam
     from hullguard.inject.command import run_inject
     from hullguard.monitor.command import run_monitor
 
@@ -227,6 +233,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
         "convert": commands.run_convert,
+        "amalgam": run_amalgam,
         "inject": run_inject,
         "report": commands.run_report,
     }

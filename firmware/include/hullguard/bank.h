@@ -19,6 +19,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                   /* flash: one a bank, generated */
     uint8_t        certificates;   /* 1 .. 255 */
     uint8_t        window;         /* samples, 1 .. 255 */
@@ -66,5 +70,9 @@ hg_status hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *radiu
 
 /** Is the window full? */
 bool hg_bank_ready(const hg_bank *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

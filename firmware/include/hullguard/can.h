@@ -5,6 +5,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define HG_CAN_DATA_MAX 64U          /* bytes; CAN FD */
 #define HG_CAN_CLASSIC_MAX 8U        /* bytes; classic CAN */
 #define HG_CAN_ID_STANDARD 0x7FFUL   /* largest 11-bit identifier */
@@ -22,5 +26,9 @@ typedef struct {
     uint8_t  length;                 /* bytes of data[], 0 .. HG_CAN_DATA_MAX */
     uint8_t  data[HG_CAN_DATA_MAX];
 } hg_can_frame;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define HG_CODE_INVALID INT32_MIN /* stands for a value that cannot be sent: out of range or not finite */
 
 typedef struct {           /* flash: one a signal, generated */
@@ -32,5 +36,9 @@ static inline hg_real hg_code_value(const hg_code_scale *scale, int32_t code)
 
 /** Is the code one that hg_code_encode() gives to a value? False for HG_CODE_INVALID. */
 bool hg_code_valid(const hg_code_scale *scale, int32_t code);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

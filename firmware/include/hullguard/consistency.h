@@ -24,6 +24,10 @@
 
 #include "hullguard/fusion.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #if HG_REAL_F32 || HG_REAL_F64
 
 typedef struct {            /* flash */
@@ -87,4 +91,8 @@ void hg_consistency_reset(hg_consistency *self);
 uint16_t hg_consistency_step(hg_consistency *self);
 
 #endif
+#ifdef __cplusplus
+}
+#endif
+
 #endif

@@ -15,6 +15,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* State of the plant. 0 is not a good state. */
 typedef enum {
     HG_PLANT_STARTING    = 0, /* the initial state still dominates a threshold */
@@ -78,5 +82,9 @@ void hg_decision_reset(hg_decision *self);
  *              among them as long as there is only one.
  *  Result: state of the plant. Cost: generators x 10 operations. */
 hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32_t *candidates);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

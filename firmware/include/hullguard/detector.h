@@ -22,6 +22,10 @@
 #include "hullguard/status.h"
 #include "hullguard/zonotope.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                /* flash: one a model, generated */
     uint8_t                   signals;    /* sent ones, 1 .. 255 */
     uint8_t                   width;      /* length of the signal vector: sent and derived, 1 .. 255 */
@@ -118,5 +122,9 @@ hg_status hg_detector_lose(hg_detector *self, uint8_t group);
  *  @retval HG_E_NUMERIC  a generator or a bank refused a number that is not finite; a generator begins again, and *finding is the others'
  *  Cost: the sum of its parts; independent of the data but for a rewind. */
 hg_status hg_detector_step(hg_detector *self, hg_finding *finding);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -40,6 +40,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define HG_E2E_LENGTH_MAX 64U    /* longest protected frame, bytes; the profiles promise 30 (P01, P11) and 32 (P02, P22) */
 #define HG_E2E_IDS 16U           /* entries of a list of data identifiers, one a counter value */
 #define HG_E2E_NO_STAMP 0xFFFFU  /* the message carries no sample index */
@@ -176,5 +180,9 @@ void hg_e2e_machine_start(hg_e2e_machine *self);
  *                    anything else: a frame that counts for neither (repeated, out of sequence)
  *  Result: the state after it. Cost: a pass over at most 16 bits. */
 hg_e2e_state hg_e2e_machine_step(hg_e2e_machine *self, const hg_e2e_limits *limits, hg_status event);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -31,6 +31,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define HG_FIELD_MOTOROLA 0x01U /* big-endian: start is the most significant bit, as in a DBC */
 #define HG_FIELD_SIGNED 0x02U   /* two's complement */
 #define HG_FIELD_FLOAT32 0x04U  /* IEEE 754, 32 bits: the code's value in signal units; not with Q31 */
@@ -71,5 +75,9 @@ void hg_frame_pack(const hg_message *message, const int32_t *code, hg_can_frame 
  *  @retval HG_E_FORMAT   hg_frame_matches() says no
  *  @retval HG_E_NUMERIC  a field holds neither a valid code nor the invalid pattern, for float32: infinity, another NaN, or out of range */
 hg_status hg_frame_unpack(const hg_message *message, const hg_can_frame *frame, int32_t *code);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

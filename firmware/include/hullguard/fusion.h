@@ -39,6 +39,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #if HG_REAL_F32 || HG_REAL_F64
 
 /* When a sensor speaks: r = y - reference. */
@@ -249,4 +253,8 @@ void hg_fusion_exclude(hg_fusion *self, uint8_t i, bool out);
 uint16_t hg_fusion_alive(const hg_fusion *self);
 
 #endif
+#ifdef __cplusplus
+}
+#endif
+
 #endif

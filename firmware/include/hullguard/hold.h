@@ -22,6 +22,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Health of one group's link. 0 is not a good state. */
 typedef enum {
     HG_BUS_ABSENT = 0, /* no good frame yet */
@@ -104,5 +108,9 @@ uint8_t hg_hold_age(const hg_hold *self);
 
 /** Health of the link as of the last step. */
 hg_bus_health hg_hold_health(const hg_hold *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

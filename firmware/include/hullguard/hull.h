@@ -28,6 +28,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                 /* flash: one a generator, generated */
     uint8_t        residuals;    /* 1 .. 255 */
     uint8_t        width;        /* signals read, 1 .. 255 */
@@ -93,5 +97,9 @@ static inline bool hg_hull_ready(const hg_hull *self)
 {
     return self->k >= ((self->how == HG_START_REST) ? self->config->ready_rest : self->config->ready_moving);
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

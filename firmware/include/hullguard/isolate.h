@@ -35,6 +35,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #if !HG_REAL_Q31
 #define HG_ISOLATE_LARGEST HG_REAL_C(1e9) /* of any force or estimate that is taken in: sums of squares stay finite in float32 */
 
@@ -125,6 +129,10 @@ void hg_isolate_reset(hg_isolate *self);
  *  each block of the window, (c + 1)^3 and (c + 1)^2 divisions. */
 hg_status hg_isolate_step(hg_isolate *self, const hg_real *estimate, const hg_real *radius, hg_isolation *found);
 
+#endif
+
+#ifdef __cplusplus
+}
 #endif
 
 #endif

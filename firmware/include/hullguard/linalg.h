@@ -6,6 +6,10 @@
 
 #include "hullguard/real.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {
     uint8_t        rows;
     uint8_t        cols;
@@ -31,6 +35,10 @@ bool hg_linalg_finite(const hg_real *x, uint16_t n);
 #if HG_REAL_F32 || HG_REAL_F64
 /** The square root of a positive number, the same bits on every target; of 0 a number below 1e-20. Constant time: 75 scalings by 4 (float64: 540), 6 divisions. */
 hg_real hg_linalg_root(hg_real x);
+#endif
+
+#ifdef __cplusplus
+}
 #endif
 
 #endif

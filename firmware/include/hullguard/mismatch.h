@@ -14,6 +14,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {              /* flash: one a model, generated */
     uint8_t        states;    /* derived signals, 0 .. 255 */
     uint8_t        width;     /* signals read, 0 .. 255 */
@@ -37,5 +41,9 @@ void hg_mismatch_step(const hg_mismatch_config *config, const hg_real *value, co
  *  @param[in,out] out       [states] the derived radii of that sample; finite as above
  *  Cost: states x width multiplications. */
 void hg_mismatch_grow(const hg_mismatch_config *config, const hg_real *increase, hg_real *out);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -27,6 +27,10 @@
 #include "hullguard/e2e.h"
 #include "hullguard/frame.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* ---- Sender ---- */
 
 typedef struct {                       /* flash: one a group */
@@ -204,5 +208,9 @@ hg_status hg_inbox_put(hg_inbox *self, const hg_can_frame *frame);
 
 /** From the main loop. @retval HG_OK *frame is the oldest  @retval HG_E_EMPTY none */
 hg_status hg_inbox_get(hg_inbox *self, hg_can_frame *frame);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -42,6 +42,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #if HG_REAL_F32 || HG_REAL_F64
 
 /** Smallest pivot of a covariance divided by its diagonal. */
@@ -190,4 +194,8 @@ void hg_polynomial_reset(hg_polynomial *self);
 hg_status hg_polynomial_step(hg_polynomial *self, const hg_real *y, const hg_real *radius);
 
 #endif
+#ifdef __cplusplus
+}
+#endif
+
 #endif

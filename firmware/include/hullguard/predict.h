@@ -16,6 +16,10 @@
 #include "hullguard/linalg.h"
 #include "hullguard/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                /* flash: one a predicted group, generated */
     uint8_t        group;       /* whose signals are predicted */
     uint8_t        first;       /* place of the group's first signal in the signal vector */
@@ -66,5 +70,9 @@ void hg_predict_reset(hg_predict *self);
  *  @param[out] out_value, out_radius  [width] the tighter of held and predicted
  *  Cost: (order + width)(order + inputs) multiplications. */
 void hg_predict_step(hg_predict *self, uint8_t age, const hg_real *value, const hg_real *radius, hg_real *out_value, hg_real *out_radius);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -22,6 +22,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Generated tables carry both kinds of numbers. */
 #if HG_REAL_Q31
 #define HG_REAL_T(x, q) (q)
@@ -273,5 +277,9 @@ static inline hg_real hg_real_min(hg_real a, hg_real b)
 {
     return (a < b) ? a : b;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -13,6 +13,10 @@
 #include "hullguard/linalg.h"
 #include "hullguard/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                /* flash: one a generator, generated */
     uint8_t        order;       /* s: length of z, 1 .. 255 */
     uint8_t        residuals;   /* length of r, 1 .. 255 */
@@ -69,5 +73,9 @@ typedef struct {
  *  @retval HG_E_NUMERIC  a signal is not finite or so large that the observer overflows; nothing changed. A filter that overflows leaves
  *                        the pair out of step: reset both */
 hg_status hg_residual_pair_step(hg_residual_pair *self, const hg_real *value, hg_real *r0, hg_real *r);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

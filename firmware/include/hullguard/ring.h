@@ -10,6 +10,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {        /* RAM */
     hg_real *data;      /* [length][width] */
     uint8_t  width;     /* signals, 1 .. 255 */
@@ -45,5 +49,9 @@ void hg_ring_rewrite(hg_ring *self, uint8_t lag, uint8_t first, uint8_t count, c
 
 /** The sample `lag` before the newest. @param[in] lag  0 .. length - 1  Result: [width]. Constant time. */
 hg_real *hg_ring_row(const hg_ring *self, uint8_t lag);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

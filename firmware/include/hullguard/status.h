@@ -4,6 +4,10 @@
 #ifndef HULLGUARD_STATUS_H
 #define HULLGUARD_STATUS_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     HG_OK           = 1,
     HG_E_ARGUMENT   = -1,  /* a null pointer or a number outside the stated range, at start */
@@ -22,5 +26,9 @@ typedef enum {
     HG_E_SEQUENCE   = -14, /* the sequence counter jumped further than the sender can have counted */
     HG_E_STATE      = -15  /* a good frame of a link that has had too many bad ones to be trusted yet */
 } hg_status;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

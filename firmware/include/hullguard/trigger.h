@@ -18,6 +18,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                /* flash: one a group, generated; shared by sender and receiver */
     uint8_t         width;        /* channels of the group, 0 (a bare tick) .. HG_GROUP_SIGNALS_MAX */
     uint8_t         levels;       /* 1 .. HG_LEVELS_MAX */
@@ -64,5 +68,9 @@ hg_status hg_trigger_start(hg_trigger *self, const hg_trigger_config *config, in
  *  @retval HG_E_EMPTY  stay silent
  *  Nothing else can happen. Cost: width multiplications, and levels x width comparisons when sending. */
 hg_status hg_trigger_step(hg_trigger *self, const int32_t *code);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -51,6 +51,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {                 /* flash: generated. Estimates in this order, one a row: */
     uint8_t            actuators; /* faults of actuators, 0 .. 255 */
     uint8_t            sensors;   /* faults of sensors, 0 .. 255 */
@@ -101,5 +105,9 @@ hg_status hg_uio_follow(hg_uio *self, const hg_detector *detector, hg_real *esti
 
 /** Has the initial state become a small part of the radii? */
 bool hg_uio_ready(const hg_uio *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

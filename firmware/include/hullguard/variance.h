@@ -16,6 +16,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct {         /* flash */
     uint8_t window;      /* W: samples, 3 .. 255 */
     bool    detrended;   /* about the straight line */
@@ -44,5 +48,9 @@ hg_status hg_variance_start(hg_variance *self, const hg_variance_config *config,
  *  @retval HG_E_EMPTY  stay silent
  *  Cost: 9 multiplications of 64 bits. */
 hg_status hg_variance_step(hg_variance *self, int16_t code);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -30,6 +30,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What becomes of the columns beyond q. */
 typedef enum {
     HG_REDUCTION_TRUNCATE = 1, /* dropped, all but the q largest in Euclid's norm, as published: NOT an outer bound, it raises false alarms; to compare with */
@@ -117,5 +121,9 @@ void hg_zonotope_step(hg_zonotope *self, const hg_ring *ring, hg_real *J);
 
 /** Has the initial state become a small part of J, and is the set a bounded one? */
 bool hg_zonotope_ready(const hg_zonotope *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
