@@ -21,6 +21,12 @@ static uint32_t spot(uint32_t n, uint32_t a, uint32_t b)
     return (a * n) + b;
 }
 
+/* The same in a symmetric matrix, of which the rows below the diagonal, and this, are kept one after the other. */
+static uint32_t half(uint32_t a, uint32_t b)
+{
+    return (a > b) ? (((a * (a + 1U)) / 2U) + b) : (((b * (b + 1U)) / 2U) + a);
+}
+
 static bool is_zero(hg_real x)
 {
     return (x >= HG_REAL_ZERO) && (x <= HG_REAL_ZERO); /* false for NaN */
@@ -45,6 +51,18 @@ static hg_real dot(const hg_real *a, const hg_real *b, uint32_t n)
     hg_real sum = HG_REAL_ZERO;
     for (uint32_t i = 0U; i < n; i++) {
         sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+/* Row a of a symmetric matrix of n rows times x. */
+static hg_real half_dot(const hg_real *S, uint32_t a, const hg_real *x, uint32_t n)
+{
+    hg_real sum = HG_REAL_ZERO;
+    uint32_t at = half(a, 0U);
+    for (uint32_t i = 0U; i < n; i++) {
+        sum += S[at] * x[i];
+        at += (i < a) ? 1U : (i + 1U);
     }
     return sum;
 }
@@ -141,8 +159,20 @@ bool hg_polynomial_valid(const hg_polynomial_config *config)
     return dimensions_fit(config) && lists_valid(config) && numbers_valid(config);
 }
 
-/* Hand the memory out. */
-/* cppcheck-suppress constParameterPointer ; its pointers are written through `array` */
+/* Lay arrays out one behind the other. Result: what follows them. */
+static hg_real *lay(hg_real *memory, hg_real **const *array, const uint32_t *size, uint8_t count)
+{
+    uint32_t next = 0U;
+    for (uint8_t i = 0U; i < count; i++) {
+        *array[i] = &memory[next];
+        next += size[i];
+    }
+    return &memory[next];
+}
+
+/* Hand the memory out. What is done with when something else begins lends its place: the powers to what follows from them (they are always longer: tests/unit),
+ * the states' polynomials to what the powers are gathered in. */
+/* cppcheck-suppress constParameterPointer ; its pointers are written through the lists */
 static void place(hg_polynomial *self, hg_real *memory)
 {
     const hg_polynomial_config *config = self->config;
@@ -152,17 +182,20 @@ static void place(hg_polynomial *self, hg_real *memory)
     const uint32_t measured = config->measured;
     const uint32_t rows = lifted + measured;
     const uint32_t ring = config->ring;
-    hg_real **const array[] = {&self->x,     &self->Px,   &self->ekf,   &self->c,     &self->Pe,   &self->z,        &self->P,    &self->M,     &self->mean, &self->eta,
-                               &self->radius, &self->width, &self->L,    &self->poly,  &self->shift, &self->term,    &self->other, &self->weigh, &self->A,    &self->AP,
-                               &self->J,     &self->slack, &self->next, &self->gain,  &self->filtered, &self->root, &self->scale, &self->r,    &self->t,    &self->Delta};
-    const uint32_t size[] = {n, n * n, n, n, n * n, lifted + 1U, lifted * lifted, (lifted + 1U) * (lifted + 1U), p, p,
-                             p, p, n * p, rows * ring, n * ring, ring, ring, ring, rows * (lifted + 1U), rows * lifted,
-                             rows * rows, rows, lifted + 1U, lifted * measured, n * measured, measured * measured, measured, measured, measured, measured};
-    uint32_t next = 0U;
-    for (uint8_t i = 0U; i < 30U; i++) {
-        *array[i] = &memory[next];
-        next += size[i];
-    }
+    hg_real **const own[] = {&self->x,      &self->Px,   &self->ekf,   &self->c,     &self->Pe,  &self->z,     &self->P, &self->M, &self->mean,  &self->eta, &self->radius,
+                             &self->width, &self->L, &self->slack, &self->weigh, &self->next, &self->root, &self->scale, &self->r, &self->t, &self->Delta, &self->poly};
+    const uint32_t own_size[] = {n, n * n, n, n, n * n, lifted + 1U, HG_POLYNOMIAL_HALF(lifted), HG_POLYNOMIAL_HALF(lifted + 1U), p, p, p,
+                                 p, n * p, rows, rows, lifted + 1U, measured * measured, measured, measured, measured, measured, rows * ring};
+    hg_real **const after_powers[] = {&self->AP, &self->gain, &self->filtered};
+    const uint32_t after_powers_size[] = {rows * lifted, lifted * measured, n * measured};
+    hg_real **const before[] = {&self->shift, &self->term};
+    const uint32_t before_size[] = {n * ring, ring};
+    hg_real **const after[] = {&self->A, &self->J};
+    const uint32_t after_size[] = {rows * (lifted + 1U), HG_POLYNOMIAL_HALF(rows)};
+    hg_real *const shared = lay(memory, own, own_size, 22U);
+    (void)lay(self->poly, after_powers, after_powers_size, 3U);
+    (void)lay(shared, before, before_size, 2U);
+    (void)lay(shared, after, after_size, 2U);
 }
 
 hg_status hg_polynomial_start(hg_polynomial *self, const hg_polynomial_config *config, hg_real *memory, uint32_t length)
@@ -196,26 +229,29 @@ void hg_polynomial_reset(hg_polynomial *self)
     take_over(self->c, config->x0, n);
     take_over(self->Px, config->P0, n * n);
     take_over(self->Pe, config->P0, n * n);
-    take_over(self->M, config->M0, wide * wide);
     take_over(self->z, config->M0, wide);
+    for (uint32_t a = 0U; a < wide; a++) {
+        take_over(&self->M[half(a, 0U)], &config->M0[spot(wide, a, 0U)], a + 1U);
+    }
     for (uint32_t a = 0U; a < lifted; a++) {
-        for (uint32_t b = 0U; b < lifted; b++) {
-            self->P[spot(lifted, a, b)] = config->M0[spot(wide, a + 1U, b + 1U)] - (config->M0[a + 1U] * config->M0[b + 1U]);
+        for (uint32_t b = 0U; b <= a; b++) {
+            self->P[half(a, b)] = config->M0[spot(wide, a + 1U, b + 1U)] - (config->M0[a + 1U] * config->M0[b + 1U]);
         }
     }
     fill(self->mean, HG_REAL_ZERO, config->outputs);
     self->judgement = (hg_polynomial_judgement){.above = 0U};
 }
 
-/* out = a b, cut off above the ring's degree. */
-static void ring_multiply(const hg_polynomial_config *config, const hg_real *a, const hg_real *b, hg_real *out)
+/* a = a b, cut off above the ring's degree. From the last monomial on: what a product is added to has been read by then. */
+static void ring_multiply(const hg_polynomial_config *config, hg_real *a, const hg_real *b)
 {
-    fill(out, HG_REAL_ZERO, config->ring);
-    for (uint16_t i = 0U; i < config->ring; i++) {
-        const uint16_t *product = &config->product[config->start[i]];
-        const uint16_t count = (uint16_t)(config->start[i + 1U] - config->start[i]);
-        for (uint16_t j = 0U; (!is_zero(a[i])) && (j < count); j++) {
-            out[product[j]] += a[i] * b[j];
+    for (uint32_t i = config->ring; i > 0U; i--) {
+        const uint16_t *product = &config->product[config->start[i - 1U]];
+        const uint16_t count = (uint16_t)(config->start[i] - config->start[i - 1U]);
+        const hg_real factor = a[i - 1U];
+        a[i - 1U] = HG_REAL_ZERO;
+        for (uint16_t j = 0U; (!is_zero(factor)) && (j < count); j++) {
+            a[product[j]] += factor * b[j];
         }
     }
 }
@@ -231,8 +267,7 @@ static void substitute(hg_polynomial *self, const hg_polynomial_map *map, uint8_
         fill(self->term, HG_REAL_ZERO, config->ring);
         self->term[0] = map->coefficient[k];
         for (uint8_t w = 0U; (w < map->width) && (factor[w] != HG_POLYNOMIAL_NONE); w++) {
-            ring_multiply(config, self->term, &self->shift[(uint32_t)factor[w] * config->ring], self->other);
-            take_over(self->term, self->other, config->ring);
+            ring_multiply(config, self->term, &self->shift[(uint32_t)factor[w] * config->ring]);
         }
         for (uint16_t m = 0U; m < config->ring; m++) {
             out[m] += self->term[m];
@@ -321,16 +356,18 @@ static void run_auxiliary(hg_polynomial *self)
     const hg_polynomial_config *config = self->config;
     const uint8_t n = config->states;
     const uint8_t p = config->outputs;
-    hg_real *HP = self->AP; /* p x n: there is room, measured >= p and lifted >= n */
     for (uint8_t j = 0U; j < p; j++) {
         const hg_real *H = &self->poly[(((uint32_t)config->lifted + j) * config->ring) + 1U];
         for (uint8_t l = 0U; l < n; l++) {
-            HP[spot(n, j, l)] = dot(H, &self->Pe[spot(n, l, 0U)], n);
-            self->L[spot(p, l, j)] = HP[spot(n, j, l)];
+            self->L[spot(p, l, j)] = dot(H, &self->Pe[spot(n, l, 0U)], n);
         }
         for (uint8_t i = 0U; i <= j; i++) {
             const hg_real *other = &self->poly[(((uint32_t)config->lifted + i) * config->ring) + 1U];
-            self->root[spot(p, j, i)] = dot(&HP[spot(n, j, 0U)], other, n);
+            hg_real sum = HG_REAL_ZERO;
+            for (uint8_t l = 0U; l < n; l++) {
+                sum += self->L[spot(p, l, j)] * other[l];
+            }
+            self->root[spot(p, j, i)] = sum;
         }
         self->width[j] = self->root[spot(p, j, j)] + config->R[j];
         self->root[spot(p, j, j)] = is_fresh(self, j) ? self->width[j] : HG_REAL_ZERO;
@@ -379,7 +416,7 @@ static void predict_auxiliary(hg_polynomial *self)
     const hg_polynomial_config *config = self->config;
     const uint8_t n = config->states;
     const uint32_t ring = config->ring;
-    hg_real *FP = self->AP;
+    hg_real *FP = self->A; /* n x n: not yet in use */
     for (uint8_t a = 0U; a < n; a++) {
         for (uint8_t l = 0U; l < n; l++) {
             FP[spot(n, a, l)] = dot(&self->poly[(a * ring) + 1U], &self->Pe[spot(n, l, 0U)], n);
@@ -405,8 +442,9 @@ static void raise_powers(hg_polynomial *self, uint8_t first, uint8_t variables, 
     const hg_polynomial_config *config = self->config;
     hg_real *poly = &self->poly[(uint32_t)first * config->ring];
     for (uint8_t a = variables; a < count; a++) {
-        const hg_real *variable = &poly[(uint32_t)config->factor[first + a] * config->ring];
-        ring_multiply(config, variable, &poly[(uint32_t)config->parent[first + a] * config->ring], &poly[(uint32_t)a * config->ring]);
+        hg_real *power = &poly[(uint32_t)a * config->ring];
+        take_over(power, &poly[(uint32_t)config->factor[first + a] * config->ring], config->ring);
+        ring_multiply(config, power, &poly[(uint32_t)config->parent[first + a] * config->ring]);
     }
 }
 
@@ -425,26 +463,34 @@ static void take_means(hg_polynomial *self)
     }
 }
 
-/* J = N: the covariance of the noise that is multiplied by the state. */
+/* weigh += worth times the coefficients of monomial j. */
+static void weigh_monomial(hg_polynomial *self, uint16_t j, hg_real worth)
+{
+    const uint8_t rows = all_of(self->config);
+    for (uint8_t a = 0U; a < rows; a++) {
+        self->weigh[a] += worth * self->poly[((uint32_t)a * self->config->ring) + j];
+    }
+}
+
+/* J = N: the covariance of the noise that is multiplied by the state. Most pairs of the noise's monomials are uncorrelated. */
 static void take_noise(hg_polynomial *self)
 {
     const hg_polynomial_config *config = self->config;
-    const uint32_t wide = (uint32_t)config->lifted + 1U;
     const uint8_t rows = all_of(config);
-    for (uint8_t a = 0U; a < rows; a++) {
-        const hg_real *poly = &self->poly[(uint32_t)a * config->ring];
-        fill(self->weigh, HG_REAL_ZERO, config->lower);
-        for (uint16_t i = 0U; i < config->lower; i++) {
-            const hg_real *covariance = &config->covariance[(uint32_t)config->noise[i] * config->noises];
-            const hg_real *moments = &self->M[(uint32_t)config->moment[i] * wide];
-            for (uint16_t j = 0U; (!is_zero(poly[i])) && (j < config->lower); j++) {
-                self->weigh[j] += poly[i] * (covariance[config->noise[j]] * moments[config->moment[j]]);
+    fill(self->J, HG_REAL_ZERO, HG_POLYNOMIAL_HALF((uint32_t)rows));
+    for (uint16_t i = 1U; i < config->lower; i++) {
+        const hg_real *covariance = &config->covariance[(uint32_t)config->noise[i] * config->noises];
+        fill(self->weigh, HG_REAL_ZERO, rows);
+        for (uint16_t j = 1U; j < config->lower; j++) {
+            const hg_real joint = covariance[config->noise[j]];
+            if (!is_zero(joint)) {
+                weigh_monomial(self, j, joint * self->M[half(config->moment[i], config->moment[j])]);
             }
         }
-        for (uint8_t b = 0U; b <= a; b++) {
-            const hg_real sum = dot(self->weigh, &self->poly[(uint32_t)b * config->ring], config->lower);
-            self->J[spot(rows, a, b)] = sum;
-            self->J[spot(rows, b, a)] = sum;
+        for (uint8_t a = 0U; a < rows; a++) {
+            for (uint8_t b = 0U; b <= a; b++) {
+                self->J[half(a, b)] += self->weigh[a] * self->poly[((uint32_t)b * config->ring) + i];
+            }
         }
     }
 }
@@ -453,11 +499,10 @@ static void take_noise(hg_polynomial *self)
 static void bound_remainders(hg_polynomial *self)
 {
     const hg_polynomial_config *config = self->config;
-    const uint32_t wide = (uint32_t)config->lifted + 1U;
     const uint8_t rows = all_of(config);
     uint8_t cutting = 0U;
     for (uint8_t l = 0U; l < config->states; l++) {
-        self->next[l] = hg_real_min(config->reach * hg_linalg_root(hg_real_max(self->P[spot(config->lifted, l, l)], HG_REAL_ZERO)), config->box[l]);
+        self->next[l] = hg_real_min(config->reach * hg_linalg_root(hg_real_max(self->P[half(l, l)], HG_REAL_ZERO)), config->box[l]);
     }
     fill(self->slack, HG_REAL_ZERO, rows);
     for (uint16_t i = config->lower; i < config->ring; i++) {
@@ -465,7 +510,7 @@ static void bound_remainders(hg_polynomial *self)
         const uint8_t m = config->cut_moment[cut];
         const uint8_t l = config->cut_state[cut];
         const hg_real far = (l == HG_POLYNOMIAL_NONE) ? ONE : self->next[l];
-        const hg_real worth = (config->cut_scale[cut] * far) * hg_linalg_root(hg_real_max(self->M[spot(wide, m, m)], HG_REAL_ZERO));
+        const hg_real worth = (config->cut_scale[cut] * far) * hg_linalg_root(hg_real_max(self->M[half(m, m)], HG_REAL_ZERO));
         for (uint8_t a = 0U; a < rows; a++) {
             self->slack[a] += hg_real_abs(self->poly[((uint32_t)a * config->ring) + i]) * worth;
         }
@@ -484,22 +529,19 @@ static void move_moments(hg_polynomial *self)
     const hg_polynomial_config *config = self->config;
     const uint8_t lifted = config->lifted;
     const uint32_t wide = (uint32_t)lifted + 1U;
-    const uint8_t rows = all_of(config);
     for (uint8_t a = 0U; a < lifted; a++) { /* [U A] M, and its first column is the mean */
-        self->next[a] = dot(&self->A[spot(wide, a, 0U)], self->M, wide);
+        self->next[a] = half_dot(self->M, 0U, &self->A[spot(wide, a, 0U)], wide);
         for (uint8_t m = 0U; m < lifted; m++) {
-            self->AP[spot(lifted, a, m)] = dot(&self->A[spot(wide, a, 0U)], &self->M[spot(wide, (uint32_t)m + 1U, 0U)], wide);
+            self->AP[spot(lifted, a, m)] = half_dot(self->M, (uint32_t)m + 1U, &self->A[spot(wide, a, 0U)], wide);
         }
     }
     for (uint8_t a = 0U; a < lifted; a++) {
         for (uint8_t b = 0U; b <= a; b++) {
             const hg_real *row = &self->A[spot(wide, b, 0U)];
-            const hg_real sum = ((self->next[a] * row[0]) + dot(&self->AP[spot(lifted, a, 0U)], &row[1], lifted)) + self->J[spot(rows, a, b)];
-            self->M[spot(wide, (uint32_t)a + 1U, (uint32_t)b + 1U)] = sum;
-            self->M[spot(wide, (uint32_t)b + 1U, (uint32_t)a + 1U)] = sum;
+            const hg_real sum = (self->next[a] * row[0]) + dot(&self->AP[spot(lifted, a, 0U)], &row[1], lifted);
+            self->M[half((uint32_t)a + 1U, (uint32_t)b + 1U)] = sum + self->J[half(a, b)];
         }
-        self->M[(uint32_t)a + 1U] = self->next[a];
-        self->M[spot(wide, (uint32_t)a + 1U, 0U)] = self->next[a];
+        self->M[half((uint32_t)a + 1U, 0U)] = self->next[a];
     }
 }
 
@@ -520,10 +562,10 @@ static hg_real take_joint(hg_polynomial *self)
     hg_real mean = HG_REAL_ZERO;
     for (uint8_t a = 0U; a < rows; a++) {
         for (uint8_t m = 0U; m < lifted; m++) {
-            self->AP[spot(lifted, a, m)] = dot(&self->A[spot(wide, a, 1U)], &self->P[spot(lifted, m, 0U)], lifted);
+            self->AP[spot(lifted, a, m)] = half_dot(self->P, m, &self->A[spot(wide, a, 1U)], lifted);
         }
         if (config->bounded) {
-            const hg_real whole = dot(&self->AP[spot(lifted, a, 0U)], &self->A[spot(wide, a, 1U)], lifted) + self->J[spot(rows, a, a)];
+            const hg_real whole = dot(&self->AP[spot(lifted, a, 0U)], &self->A[spot(wide, a, 1U)], lifted) + self->J[half(a, a)];
             mean += (whole > HG_REAL_ZERO) ? (self->slack[a] / (whole * (hg_real)rows)) : HG_REAL_ZERO;
         }
     }
@@ -532,12 +574,10 @@ static hg_real take_joint(hg_polynomial *self)
     }
     for (uint8_t a = 0U; a < rows; a++) {
         for (uint8_t b = 0U; b <= a; b++) {
-            const hg_real sum = self->J[spot(rows, a, b)] + ((ONE + e) * dot(&self->AP[spot(lifted, a, 0U)], &self->A[spot(wide, b, 1U)], lifted));
-            self->J[spot(rows, a, b)] = sum;
-            self->J[spot(rows, b, a)] = sum;
+            self->J[half(a, b)] += (ONE + e) * dot(&self->AP[spot(lifted, a, 0U)], &self->A[spot(wide, b, 1U)], lifted);
         }
         if (config->bounded) {
-            self->J[spot(rows, a, a)] += (ONE + (ONE / e)) * self->slack[a];
+            self->J[half(a, a)] += (ONE + (ONE / e)) * self->slack[a];
         }
     }
     return ONE + e;
@@ -571,7 +611,7 @@ static bool is_worth(const hg_polynomial *self, uint8_t j)
     const hg_polynomial_config *config = self->config;
     const uint8_t a = (uint8_t)(config->lifted + j);
     const hg_real radius = self->radius[j];
-    return is_fresh(self, j) || (is_there(self, j) && ((radius * radius) < self->J[spot(all_of(config), a, a)]));
+    return is_fresh(self, j) || (is_there(self, j) && ((radius * radius) < self->J[half(a, a)]));
 }
 
 /* Jyy to factor, with Delta in it; rows that are left out have 0 on the diagonal. Result: 1 + d. */
@@ -579,13 +619,12 @@ static hg_real take_spread(hg_polynomial *self)
 {
     const hg_polynomial_config *config = self->config;
     const uint8_t count = config->measured;
-    const uint8_t rows = all_of(config);
     hg_real mean = HG_REAL_ZERO;
     uint8_t silent = 0U;
     uint8_t used = 0U;
     for (uint8_t k = 0U; k < count; k++) { /* slack: 1 for rows that are used */
         const uint8_t a = (uint8_t)(config->lifted + k);
-        const hg_real variance = self->J[spot(rows, a, a)];
+        const hg_real variance = self->J[half(a, a)];
         const bool first = k < config->outputs;
         const bool whole = first || (self->slack[config->lifted + config->parent[a]] > HG_REAL_ZERO);
         const bool used_here = whole && is_worth(self, first ? k : config->factor[a]);
@@ -600,7 +639,7 @@ static hg_real take_spread(hg_polynomial *self)
     for (uint8_t k = 0U; k < count; k++) {
         const uint8_t a = (uint8_t)(config->lifted + k);
         for (uint8_t i = 0U; i <= k; i++) {
-            self->root[spot(count, k, i)] = (ONE + d) * self->J[spot(rows, a, (uint32_t)config->lifted + i)];
+            self->root[spot(count, k, i)] = (ONE + d) * self->J[half(a, (uint32_t)config->lifted + i)];
         }
         if (self->slack[a] <= HG_REAL_ZERO) {
             self->root[spot(count, k, k)] = HG_REAL_ZERO;
@@ -617,7 +656,6 @@ static hg_real take_spread(hg_polynomial *self)
 static void compare(hg_polynomial *self)
 {
     const hg_polynomial_config *config = self->config;
-    const uint8_t rows = all_of(config);
     hg_polynomial_judgement *judgement = &self->judgement;
     hg_real trace = HG_REAL_ZERO;
     hg_real square = HG_REAL_ZERO;
@@ -626,7 +664,7 @@ static void compare(hg_polynomial *self)
     for (uint8_t j = 0U; j < config->outputs; j++) {
         const uint8_t a = (uint8_t)(config->lifted + j);
         if (is_there(self, j)) {
-            trace += self->J[spot(rows, a, a)];
+            trace += self->J[half(a, a)];
             square += self->r[j] * self->r[j];
             radius += is_fresh(self, j) ? HG_REAL_ZERO : (self->radius[j] * self->radius[j]);
         }
@@ -649,16 +687,15 @@ static bool take_gains(hg_polynomial *self, hg_real wider, hg_real bound)
     const hg_polynomial_config *config = self->config;
     const uint8_t lifted = config->lifted;
     const uint8_t count = config->measured;
-    const uint8_t rows = all_of(config);
     bool good = true;
     hg_real left = HG_REAL_ZERO;
     for (uint8_t a = 0U; a < lifted; a++) {
         hg_real *gain = &self->gain[spot(count, a, 0U)];
         for (uint8_t k = 0U; k < count; k++) {
-            gain[k] = wider * self->J[spot(rows, a, (uint32_t)lifted + k)];
+            gain[k] = wider * self->J[half(a, (uint32_t)lifted + k)];
         }
         forward(self, count, gain);
-        const hg_real before = wider * self->J[spot(rows, a, a)];
+        const hg_real before = wider * self->J[half(a, a)];
         good = good && ((before - dot(gain, gain, count)) >= -(HG_POLYNOMIAL_PIVOT * before));
     }
     for (uint8_t a = 0U; a < config->states; a++) {
@@ -667,7 +704,7 @@ static bool take_gains(hg_polynomial *self, hg_real wider, hg_real bound)
             gain[k] = (wider * bound) * self->AP[spot(lifted, (uint32_t)lifted + k, a)];
         }
         forward(self, count, gain);
-        const hg_real alone = bound * self->P[spot(lifted, a, a)];
+        const hg_real alone = bound * self->P[half(a, a)];
         const hg_real after = (wider * alone) - dot(gain, gain, count);
         good = good && (after >= -(HG_POLYNOMIAL_PIVOT * alone));
         left += (alone > HG_REAL_ZERO) ? (after / alone) : ONE;
@@ -685,7 +722,7 @@ static void estimate(hg_polynomial *self, hg_real factor)
         const hg_real *gain = &self->filtered[spot(count, a, 0U)];
         self->x[a] += self->z[(uint32_t)a + 1U] + dot(gain, self->t, count);
         for (uint8_t b = 0U; b <= a; b++) {
-            const hg_real sum = (factor * self->P[spot(config->lifted, a, b)]) - dot(gain, &self->filtered[spot(count, b, 0U)], count);
+            const hg_real sum = (factor * self->P[half(a, b)]) - dot(gain, &self->filtered[spot(count, b, 0U)], count);
             self->Px[spot(n, a, b)] = (a == b) ? hg_real_max(sum, HG_REAL_ZERO) : sum;
             self->Px[spot(n, b, a)] = self->Px[spot(n, a, b)];
         }
@@ -703,9 +740,8 @@ static void predict_lifted(hg_polynomial *self, hg_real wider)
         const hg_real *gain = &self->gain[spot(count, a, 0U)];
         self->next[a] = dot(&self->A[spot(wide, a, 0U)], self->z, wide) + dot(gain, self->t, count);
         for (uint8_t b = 0U; b <= a; b++) {
-            const hg_real sum = (wider * self->J[spot(all_of(config), a, b)]) - dot(gain, &self->gain[spot(count, b, 0U)], count);
-            self->P[spot(lifted, a, b)] = (a == b) ? hg_real_max(sum, HG_REAL_ZERO) : sum;
-            self->P[spot(lifted, b, a)] = self->P[spot(lifted, a, b)];
+            const hg_real sum = (wider * self->J[half(a, b)]) - dot(gain, &self->gain[spot(count, b, 0U)], count);
+            self->P[half(a, b)] = (a == b) ? hg_real_max(sum, HG_REAL_ZERO) : sum;
         }
     }
     take_over(&self->z[1], self->next, lifted);
@@ -748,7 +784,7 @@ static bool all_finite(const hg_polynomial *self)
     const uint32_t n = self->config->states;
     const uint32_t wide = (uint32_t)self->config->lifted + 1U;
     const hg_real *const array[] = {self->x, self->Px, self->c, self->Pe, self->z, self->P, self->M, self->mean, &self->judgement.plain};
-    const uint32_t size[] = {n, n * n, n, n * n, wide, (wide - 1U) * (wide - 1U), wide * wide, self->config->outputs, 1U};
+    const uint32_t size[] = {n, n * n, n, n * n, wide, HG_POLYNOMIAL_HALF(wide - 1U), HG_POLYNOMIAL_HALF(wide), self->config->outputs, 1U};
     hg_real defects = HG_REAL_ZERO;
     for (uint8_t i = 0U; i < 9U; i++) {
         for (uint32_t m = 0U; m < size[i]; m++) {

@@ -8,7 +8,7 @@ ORACLE_EIGEN ?= /usr/include/eigen3
 ORACLE_CXX   := $(CXX) -std=c++17 -O1 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
                 -isystem $(ORACLE_EIGEN) -Ifirmware/include $(DEPEND)
 ORACLE_TESTS := $(foreach r,$(FLOATS),$(patsubst $(ORACLE)/%.cpp,$(ORACLE_BUILD)/$(r)/%,$(wildcard $(ORACLE)/test_*.cpp)))
-ORACLE_ONCE  := $(patsubst %,$(ORACLE_BUILD)/%.o,oracle problem oracle_run)
+ORACLE_ONCE  := $(patsubst %,$(ORACLE_BUILD)/%.o,oracle problem polynomial_oracle oracle_run)
 OBJECTS += $(ORACLE_ONCE) $(ORACLE_TESTS:=.o)
 
 .PHONY: oracle
@@ -32,6 +32,8 @@ $(filter $(ORACLE_BUILD)/$(1)/%,$(ORACLE_TESTS)): %: %.o $(ORACLE_BUILD)/oracle.
 	$$(Q)$$(CXX) -fsanitize=address,undefined -o $$@ $$^ -lcmocka
 endef
 $(foreach r,$(FLOATS),$(eval $(call oracle_variant,$(r))))
+$(ORACLE_BUILD)/polynomial_oracle.o: ORACLE_CXX += -O2
+$(FLOATS:%=$(ORACLE_BUILD)/%/test_polynomial): $(ORACLE_BUILD)/polynomial_oracle.o
 
 $(ORACLE_BUILD)/oracle_run: $(ORACLE_BUILD)/oracle_run.o $(ORACLE_BUILD)/oracle.o
 	$(Q)$(CXX) -o $@ $^

@@ -3,7 +3,8 @@
  *  that closes samples, outages. A hash is printed over every verdict, every report and the bits of every value, radius, r and J. float32
  *  arithmetic is exact to the bit by IEEE 754 wherever no product is fused into a sum and no subnormal number is flushed to zero, and fixed point
  *  is integers, so that every processor must print the same. To have subnormal numbers, and in fixed point such as do not fit, the residual
- *  generators run once more on signals of such a size. Then the fusion filter (corpus_fusion.c). No C library is needed. */
+ *  generators run once more on signals of such a size. Then the fusion filter (corpus_fusion.c)
+ *  and the polynomial filter (corpus_polynomial.c). No C library is needed. */
 
 #include "console.h"
 #include "openacc.h"
@@ -14,9 +15,11 @@
 
 #if !HG_REAL_Q31
 #include "corpus_fusion.h" /* in float only */
+#include "corpus_polynomial.h"
 #endif
 
 #define SAMPLES 4096UL
+#define POLYNOMIAL_SAMPLES 128UL
 #define PART 1024UL   /* samples between two lines: they tell where two processors part */
 #define WALK 256UL    /* samples of random walk, then as many of standstill */
 #define GROUPS 8U
@@ -327,8 +330,10 @@ int main(void)
     }
 #if !HG_REAL_Q31
     const uint64_t fusion = corpus_fusion(SAMPLES);
-    good = good && (fusion != 0U);
+    const uint64_t polynomial = corpus_polynomial(POLYNOMIAL_SAMPLES);
+    good = good && (fusion != 0U) && (polynomial != 0U);
     print_hex("fusion ", fusion, 16U);
+    print_hex(" polynomial ", polynomial, 16U);
     print("\n");
 #endif
     print(good ? "corpus ends\n" : "corpus fails\n");

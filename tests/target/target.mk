@@ -24,7 +24,7 @@ UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TES
 
 # What a program is made of beside its test: by the C library of its target.
 CORPUS_SRC        := tests/target/corpus.c $(patsubst %,firmware/models/%.c,platoon platoon_bank openacc)
-CORPUS_SRC_f32    := $(CORPUS_SRC) tests/target/corpus_fusion.c
+CORPUS_SRC_f32    := $(CORPUS_SRC) tests/target/corpus_fusion.c tests/target/corpus_polynomial.c
 CORPUS_SRC_q31    := $(CORPUS_SRC)
 NODE_SRC          := firmware/apps/detector_main.c tests/target/board_script.c firmware/models/platoon.c
 CONSOLE_none      := tests/target/console_semihosting.c hal/semihosting/semihosting.c
@@ -60,7 +60,7 @@ $(FIRMWARE)/%/image.ok: $(FIRMWARE)/%/detector.elf $(FIRMWARE)/%/libhullguard.a 
 
 # $(call host_corpus,REAL,LIBRARY)
 define host_corpus
-$(eval $(call objects,$(TARGET_TESTS)/host-$(1),$(CORPUS_SRC_$(1)) $(CONSOLE_glibc),$$(CC) $$(OPTIMISE) $(REAL_FLAG_$(1)) -Itests/target))
+$(eval $(call objects,$(TARGET_TESTS)/host-$(1),$(CORPUS_SRC_$(1)) $(CONSOLE_glibc),$$(CC) $$(OPTIMISE) $(REAL_FLAG_$(1)) -Itests/target -I$(TARGET_TESTS)))
 $(TARGET_TESTS)/host-$(1)/corpus: $(call target_objects,host-$(1),$(CORPUS_SRC_$(1)) $(CONSOLE_glibc)) $(2)
 	$$(Q)$$(CC) -o $$@ $$^
 $(TARGET_TESTS)/host-$(1)/corpus.log: $(TARGET_TESTS)/host-$(1)/corpus
@@ -71,7 +71,7 @@ $(eval $(call host_corpus,q31,$(LIB_SRC:%.c=$(BUILD)/shared-q31/%.o)))
 
 # $(call target_tests,BUILD,LIBC,TARGET,REAL)
 define target_tests
-$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC_$(4)) $(NODE_SRC)) $(CONSOLE_$(2)) $(if $(filter $(1),$(UNIT_TARGETS)),$(CMOCKA_$(2)) $(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target))
+$(eval $(call objects,$(TARGET_TESTS)/$(1),$(sort $(CORPUS_SRC_$(4)) $(NODE_SRC)) $(CONSOLE_$(2)) $(if $(filter $(1),$(UNIT_TARGETS)),$(CMOCKA_$(2)) $(UNIT_TESTS:%=tests/unit/%.c)),$$(call cross_cc,$(1)) $$(TEST_FLAGS_$(2)) -Itests/target -I$(TARGET_TESTS)))
 $(TARGET_TESTS)/$(1)/corpus $(TARGET_TESTS)/$(1)/node: hal/start/image.ld
 $(TARGET_TESTS)/$(1)/corpus: $(call target_objects,$(1),$(CORPUS_SRC_$(4)) $(CONSOLE_$(2))) $(call target_start,$(1),$(3)) $(FIRMWARE)/$(1)/libhullguard.a
 	$$(Q)$$(call cross_cc,$(1)) $$(call CORPUS_LINK_$(2),$(1)) -o $$@ $$(filter %.o %.a,$$^) -lgcc
@@ -84,6 +84,13 @@ $(TARGET_TESTS)/$(1)/node.ok: $(TARGET_TESTS)/$(1)/node
 	    { cat $$<.log $$<.err; echo "FAILED $$<"; exit 1; }
 endef
 $(foreach b,$(RUN_BUILDS),$(eval $(call target_tests,$(b),$(LIBC_$(call target_of,$(b))),$(call target_of,$(b)),$(call real_of,$(b)))))
+
+# Filters of a nonlinear plant, for which no model is shipped.
+POLYNOMIAL_TABLES := $(TARGET_TESTS)/polynomial_tables.h
+$(POLYNOMIAL_TABLES): tests/target/polynomial_tables.py host_tools/hullguard/design/polynomial.py host_tools/hullguard/campaign/polynomial_study.py | lib
+	@mkdir -p $(@D)
+	$(Q)PYTHONPATH=host_tools $(PY) $< $@
+$(patsubst %,$(TARGET_TESTS)/%/tests/target/corpus_polynomial.o,host-f32 $(RUN_TARGETS)): $(POLYNOMIAL_TABLES)
 
 SEEDED := cortex_m4f
 $(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWARE)/$(SEEDED)/image.ok $(FIRMWARE)/$(SEEDED)-q31/image.ok $(TARGET_TESTS)/$(SEEDED)/corpus.ok

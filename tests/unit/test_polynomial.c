@@ -316,7 +316,33 @@ static void memory_is_as_long_as_said(void **state)
     assert_status(HG_OK, hg_polynomial_start(&p->self, &p->config, p->memory, length));
     assert_status(HG_OK, step(p, 1.0));
     assert_untouched(&p->memory[length], REALS_MAX - length);
-    assert_true(&p->self.Delta[p->config.measured] == &p->memory[length]);
+    assert_true(&p->self.term[p->config.ring] == &p->memory[length]);
+    set_up(p, 2U, 1U, 2U, false, true);
+    begin(p);
+    const uint32_t plain = hg_polynomial_reals(2U, 1U, 2U, false);
+    assert_true(&p->self.J[HG_POLYNOMIAL_HALF(7U)] == &p->memory[plain]);
+    assert_true(plain < length);
+}
+
+/* What lies in the place of the powers once they are done with is never longer than they are. */
+static void the_powers_have_room_for_what_follows(void **state)
+{
+    (void)state;
+    uint32_t sizes = 0U;
+    for (uint8_t n = 1U; n <= 100U; n++) {
+        for (uint8_t p = 1U; p <= 100U; p++) {
+            for (uint8_t mu = 1U; mu <= 3U; mu++) {
+                if (hg_polynomial_reals(n, p, mu, false) != UINT32_MAX) {
+                    const uint32_t lifted = hg_polynomial_count(n, mu) - 1U;
+                    const uint32_t measured = hg_polynomial_count(p, mu) - 1U;
+                    const uint32_t ring = hg_polynomial_count((2U * n) + p, mu);
+                    assert_true((lifted + measured) * ring >= ((lifted + measured) * lifted) + ((lifted + n) * measured));
+                    sizes++;
+                }
+            }
+        }
+    }
+    assert_true(sizes > 1000U);
 }
 
 /* Best estimate of x from 1, y, y^2 with x ~ N(0, 1), y = x + v, E v^2 = R, E v^3 = s: by its normal equations. */
@@ -585,6 +611,7 @@ int main(void)
         cmocka_unit_test(sizes_are_binomials),
         cmocka_unit_test(validity_looks_at_every_number_and_table),
         cmocka_unit_test(memory_is_as_long_as_said),
+        cmocka_unit_test(the_powers_have_room_for_what_follows),
         cmocka_unit_test(the_third_moment_is_used),
         cmocka_unit_test(linear_and_normal_is_the_kalman_filter),
         cmocka_unit_test(the_bound_is_wider),

@@ -111,13 +111,20 @@ uint32_t hg_polynomial_count(uint32_t variables, uint32_t degree);
 /** Numbers of RAM; UINT32_MAX for a size that the configuration cannot express. */
 uint32_t hg_polynomial_reals(uint8_t states, uint8_t outputs, uint8_t degree, bool bounded);
 
+/** Numbers of a symmetric matrix of so many rows. */
+#define HG_POLYNOMIAL_HALF(rows) (((rows) * ((rows) + 1U)) / 2U)
+
+/** Numbers that two phases of a step share: polynomials of the states first, then [U A; V C] and J. */
+#define HG_POLYNOMIAL_BEFORE(states, ring) (((uint32_t)(states) + 1U) * (uint32_t)(ring))
+#define HG_POLYNOMIAL_AFTER(lifted, rows) (((rows) * ((uint32_t)(lifted) + 1U)) + HG_POLYNOMIAL_HALF(rows))
+#define HG_POLYNOMIAL_LARGER(a, b) (((a) > (b)) ? (a) : (b))
+
 /** The same as a constant, for static memory: lifted, measured and ring as in the configuration. */
 #define HG_POLYNOMIAL_REALS(states, outputs, lifted, measured, ring) \
-    (((uint32_t)(states) * ((2U * (uint32_t)(states)) + (uint32_t)(outputs) + (uint32_t)(measured) + 3U)) + (4U * (uint32_t)(outputs)) + \
-     ((uint32_t)(lifted) * (uint32_t)(lifted)) + (((uint32_t)(lifted) + 1U) * ((uint32_t)(lifted) + 3U)) + \
-     (((uint32_t)(lifted) + (uint32_t)(measured) + (uint32_t)(states) + 3U) * (uint32_t)(ring)) + \
-     (((uint32_t)(lifted) + (uint32_t)(measured)) * ((3U * (uint32_t)(lifted)) + (uint32_t)(measured) + 2U)) + \
-     ((uint32_t)(measured) * ((uint32_t)(lifted) + (uint32_t)(measured) + 4U)))
+    (((uint32_t)(states) * ((2U * (uint32_t)(states)) + (uint32_t)(outputs) + 3U)) + (4U * (uint32_t)(outputs)) + \
+     HG_POLYNOMIAL_HALF((uint32_t)(lifted)) + HG_POLYNOMIAL_HALF((uint32_t)(lifted) + 1U) + (2U * ((uint32_t)(lifted) + 1U)) + \
+     (((uint32_t)(lifted) + (uint32_t)(measured)) * ((uint32_t)(ring) + 2U)) + ((uint32_t)(measured) * ((uint32_t)(measured) + 4U)) + \
+     HG_POLYNOMIAL_LARGER(HG_POLYNOMIAL_BEFORE(states, ring), HG_POLYNOMIAL_AFTER(lifted, (uint32_t)(lifted) + (uint32_t)(measured))))
 
 /* Which statistic is above its level: bits. */
 #define HG_POLYNOMIAL_PLAIN 1U
@@ -132,7 +139,7 @@ typedef struct {             /* of the last sample */
     uint8_t above;           /* HG_POLYNOMIAL_* bits */
 } hg_polynomial_judgement;
 
-typedef struct {                         /* RAM */
+typedef struct {                         /* RAM; half: the lower half of a symmetric matrix of so many rows, row after row */
     const hg_polynomial_config *config;
     hg_real                *x;           /* [n] estimate of the last sample, with its measurement */
     hg_real                *Px;          /* n x n, its covariance */
@@ -140,30 +147,29 @@ typedef struct {                         /* RAM */
     hg_real                *c;           /* [n] point of expansion for the next sample and */
     hg_real                *Pe;          /* n x n, its covariance by the auxiliary filter */
     hg_real                *z;           /* [N + 1] prediction of [1; X], */
-    hg_real                *P;           /* N x N, its covariance, and */
-    hg_real                *M;           /* (N + 1) x (N + 1) unconditional second moments */
+    hg_real                *P;           /* half N, its covariance, and */
+    hg_real                *M;           /* half N + 1, unconditional second moments */
     hg_real                *mean;        /* [p] EWMA */
     hg_real                *eta;         /* [p], */
     hg_real                *radius;      /* [p], */
     hg_real                *width;       /* [p], */
     hg_real                *L;           /* n x p, */
-    hg_real                *poly;        /* (N + measured) x ring: powers of xi+, then of eta, */
-    hg_real                *shift;       /* n x ring, */
-    hg_real                *term;        /* [ring], */
-    hg_real                *other;       /* [ring], */
-    hg_real                *weigh;       /* [ring], */
-    hg_real                *A;           /* (N + measured) x (N + 1) [U A; V C], */
-    hg_real                *AP;          /* (N + measured) x N, */
-    hg_real                *J;           /* (N + measured)^2, */
     hg_real                *slack;       /* [N + measured], */
+    hg_real                *weigh;       /* [N + measured], */
     hg_real                *next;        /* [N + 1], */
-    hg_real                *gain;        /* N x measured, */
-    hg_real                *filtered;    /* n x measured, */
     hg_real                *root;        /* measured x measured, */
     hg_real                *scale;       /* [measured], */
     hg_real                *r;           /* [measured], */
     hg_real                *t;           /* [measured], */
-    hg_real                *Delta;       /* [measured]: scratch */
+    hg_real                *Delta;       /* [measured], */
+    hg_real                *poly;        /* (N + measured) x ring: powers of xi+, then of eta; then in their place */
+    hg_real                *AP;          /* (N + measured) x N, */
+    hg_real                *gain;        /* N x measured, */
+    hg_real                *filtered;    /* n x measured, */
+    hg_real                *shift;       /* n x ring, */
+    hg_real                *term;        /* [ring], and then in the place of these two */
+    hg_real                *A;           /* (N + measured) x (N + 1) [U A; V C], */
+    hg_real                *J;           /* half N + measured: scratch */
     hg_polynomial_judgement judgement;
     uint16_t                dropped;     /* components left out because of their pivot, */
     uint16_t                held;        /* updates not made, and */

@@ -7,13 +7,16 @@ made with: degree 3 all but decodes it. Exponential noise stands beside it, with
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from scipy.stats import t as student_t
+
 from hullguard.core.library import library
 from hullguard.core.polynomial import DRIFT, JOINT, PLAIN, Case, Levels, Outcome, run
-from hullguard.design.polynomial import Noise, Plant, Tables, atoms, exponential, make, normal, variables
+from hullguard.design.polynomial import Noise, Plant, Tables, atoms, contaminated, exponential, laplace, make, normal, student, uniform, variables
 
 SKEW = 21.0**0.5  # two values -7 and 3 with 0.3 and 0.7 have this standard deviation
 AT = 100  # first faulty sample
@@ -44,7 +47,19 @@ def two_valued(deviation: float) -> Noise:
     return atoms((-7.0 * deviation / SKEW, 3.0 * deviation / SKEW), (0.3, 0.7))
 
 
-SHAPES = {"atoms": two_valued, "exp": exponential, "gauss": normal}
+SHAPES: dict[str, Callable[[float], Noise]] = {
+    "atoms": two_valued,
+    "exp": exponential,
+    "gauss": normal,
+    "uniform": lambda deviation: uniform(deviation * 3.0**0.5),
+    "laplace": laplace,
+    "student": lambda deviation: student(deviation, 5.0),  # no moment of order 5: the heaviest tail that degree 2 can be made for
+    "contaminated": lambda deviation: contaminated(deviation, 0.05, 5.0),
+}
+HEAVY = ("exp", "laplace", "student", "contaminated")  # tails in which four standard deviations are nothing rare
+LEVELS = Levels()
+BLOCKS = 40  # independent groups of runs that a confidence bound is made from
+CONFIDENCE = 0.999
 
 
 def bilinear(v: Noise, w: Noise) -> Plant:
@@ -134,6 +149,28 @@ def detection(study: Study) -> Iterator[Check]:
     yield Check("E2 atoms: the sensor fault missed, plain (control: Chebyshev's threshold is far off)", found.missed(PLAIN), 0.5, 1.0)
 
 
+def promises(study: Study) -> Iterator[Check]:
+    """What Chebyshev's inequality promises, whatever the noise: false alarms a sample, bounded from above with CONFIDENCE by Student's t over independent blocks of runs;
+    and a sensor fault of four standard deviations, either way, that one of the statistics sees at once. Where four deviations are nothing rare, joint alone may not."""
+    for shape in SHAPES:
+        plant = suspension(shape)
+        each = [Study(max(2, study.runs // 10), study.seed + 1_000_003 * (1 + b), study.real).of(plant, 2, samples=300) for b in range(BLOCKS)]
+        for i, share in enumerate(np.mean([found.consistency() for found in each], axis=0)):
+            yield Check(f"E2 {shape}, degree 2: E e^2 / P of x{i + 1}", float(share), 0.9, 1.1)
+        for name, statistic, promised in (("plain", PLAIN, 1.0 / LEVELS.kappa**2), ("joint", JOINT, 2.0 / LEVELS.joint)):
+            shares = [found.alarms[statistic] for found in each]
+            most = np.mean(shares) + student_t.ppf(CONFIDENCE, BLOCKS - 1) * np.std(shares, ddof=1) / BLOCKS**0.5
+            yield Check(f"E2 {shape}, degree 2: false alarms a sample, {name}, at most ({100 * CONFIDENCE:g} %)", float(most), 0.0, promised)
+        for size in (0.8, -0.8):
+            found = study.of(plant, 2, fault="sensor", fault_at=AT, size=(size,))
+            at = np.where(found.first < 0, found.case.samples, found.first).min(axis=1)
+            yield Check(f"E2 {shape}, degree 2: sensor fault of {size:+g} missed by all statistics", float((at == found.case.samples).mean()), 0.0, 0.02)
+            yield Check(f"E2 {shape}, degree 2: sensor fault of {size:+g}, samples until one sees it, median", float(np.median(at)), 0.0, 4.0 if shape in HEAVY else 1.0)
+            yield Check(f"E2 {shape}, degree 2: sensor fault of {size:+g} missed, joint", found.missed(JOINT), 0.0, 0.2 if shape in HEAVY else 0.02)
+    trusting = study.of(suspension("exp"), 2, levels=Levels(kappa=LEVELS.kappa / 4.0), samples=300).alarms[PLAIN]
+    yield Check("E2 exp, degree 2: false alarms a sample, plain, with a quarter of the threshold (control)", trusting, 1.0 / LEVELS.kappa**2, 1.0)
+
+
 def events(study: Study) -> Iterator[Check]:
     """Send-on-delta of half a standard deviation: silence as value and radius, and as if the value held were a measurement."""
     delta = 0.1
@@ -158,5 +195,5 @@ def precision(study: Study) -> Iterator[Check]:
 def all_checks(runs: int, seed: int) -> Iterator[Check]:
     """Everything."""
     study = Study(runs, seed)
-    for part in (linear, errors, bounds, detection, events, precision):
+    for part in (linear, errors, bounds, detection, promises, events, precision):
         yield from part(study)

@@ -13,7 +13,7 @@ from hullguard.design.polynomial import Map, Noise, Tables
 from hullguard.errors import InputError
 from hullguard.model.table import Array
 
-KINDS = {"normal": 1, "exponential": 2, "uniform": 3, "atoms": 4}
+KINDS = {"normal": 1, "exponential": 2, "uniform": 3, "atoms": 4, "laplace": 5, "student": 6, "contaminated": 7}
 FAULTS = {"good": 0, "actuator": 1, "sensor": 2}
 PLAIN, JOINT, DRIFT = 0, 1, 2  # places of the statistics; bits of hg_polynomial_judgement.above
 FAR = 1e6  # range of a measurement and of the remainder where nothing else is said, signal units

@@ -20,7 +20,12 @@ typedef struct {
     int64_t                      run; /* of this batch */
 } runner;
 
-/* Two numbers of the stream for each draw, whatever the kind. */
+static double normal_of(double scale, double u, double v)
+{
+    return scale * sqrt(-2.0 * log(u)) * cos(TWO_PI * v);
+}
+
+/* Two numbers of the stream for each draw, whatever the kind. Student's t by Bailey's polar form. */
 static double noise_of(const hgh_polynomial_noise *noise, hgh_random *random)
 {
     const double u = 1.0 - hgh_random_unit(random);
@@ -36,8 +41,15 @@ static double noise_of(const hgh_polynomial_noise *noise, hgh_random *random)
             atom++;
         }
         return noise->value[atom];
+    case HGH_NOISE_LAPLACE:
+        return noise->scale * ((v < 0.5) ? log(u) : -log(u));
+    case HGH_NOISE_STUDENT:
+        return noise->scale * sqrt(noise->value[0] * (pow(u, -2.0 / noise->value[0]) - 1.0)) * cos(TWO_PI * v);
+    case HGH_NOISE_CONTAMINATED: /* within each share v is evenly spread once more */
+        return (v < noise->value[0]) ? normal_of(noise->scale * noise->value[1], u, v / noise->value[0])
+                                     : normal_of(noise->scale, u, (v - noise->value[0]) / (1.0 - noise->value[0]));
     default:
-        return noise->scale * sqrt(-2.0 * log(u)) * cos(TWO_PI * v);
+        return normal_of(noise->scale, u, v);
     }
 }
 

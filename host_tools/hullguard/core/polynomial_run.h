@@ -6,14 +6,22 @@
 
 #include "hullguard/hullguard.h"
 
-enum { HGH_NOISE_NORMAL = 1, HGH_NOISE_EXPONENTIAL = 2, HGH_NOISE_UNIFORM = 3, HGH_NOISE_ATOMS = 4 };
+enum {
+    HGH_NOISE_NORMAL = 1,
+    HGH_NOISE_EXPONENTIAL = 2,
+    HGH_NOISE_UNIFORM = 3,
+    HGH_NOISE_ATOMS = 4,
+    HGH_NOISE_LAPLACE = 5,
+    HGH_NOISE_STUDENT = 6,     /* value[0]: degrees of freedom */
+    HGH_NOISE_CONTAMINATED = 7 /* normal; value[0]: share of the numbers that are value[1] times as wide */
+};
 enum { HGH_PLANT_GOOD = 0, HGH_PLANT_ACTUATOR = 1, HGH_PLANT_SENSOR = 2 };
 
 #define HGH_POLYNOMIAL_STATISTICS 3 /* plain, joint, drift */
 
 typedef struct {
     int32_t       kind;   /* HGH_NOISE_* */
-    double        scale;  /* standard deviation; of a uniform one half of its width */
+    double        scale;  /* of a uniform one half of its width, of a normal and an exponential one its standard deviation, else that of the usual density */
     int32_t       atoms;
     const double *value;  /* [atoms] */
     const double *below;  /* [atoms] probability of this atom and those before it */

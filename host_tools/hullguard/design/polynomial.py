@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -121,7 +121,8 @@ def cut(bound: float, reach: float, order: int) -> float:
 
 @dataclass(frozen=True)
 class Noise:
-    """A distribution without mean. kind: normal, exponential (scale times (Exp(1) - 1)), uniform (+-scale), atoms."""
+    """A distribution without mean. kind: normal, exponential (scale times (Exp(1) - 1)), uniform (+-scale), atoms (values with weights), laplace, student (values: degrees
+    of freedom), contaminated (normal; values: share of the numbers that are so many times as wide)."""
 
     kind: str
     scale: float = 0.0
@@ -136,7 +137,48 @@ class Noise:
             return float(self.scale**order) * sum((-1 if i % 2 else 1) * math.factorial(order) // math.factorial(i) for i in range(order + 1))
         if self.kind == "uniform":
             return 0.0 if order % 2 else float(self.scale**order) / (order + 1)
+        if self.kind in SYMMETRIC:
+            return 0.0 if order % 2 else float(self.scale**order) * SYMMETRIC[self.kind](self.values, order)
         return float(sum(p * float(v**order) for v, p in zip(self.values, self.weights, strict=True)))
+
+
+def _student(values: tuple[float, ...], order: int) -> float:
+    freedom = values[0]
+    if order >= freedom:
+        raise InputError(f"polynomial: Student's t with {freedom:g} degrees of freedom has no moment of order {order}; take more, a lower degree, or no bound")
+    return math.prod(freedom * (k - 1) / (freedom - k) for k in range(2, order + 1, 2))
+
+
+def _contaminated(values: tuple[float, ...], order: int) -> float:
+    share, ratio = values
+    return (1.0 - share + share * float(ratio**order)) * math.prod(range(1, order, 2))
+
+
+# Even moments of scale 1.
+SYMMETRIC: dict[str, Callable[[tuple[float, ...], int], float]] = {
+    "laplace": lambda _, order: float(math.factorial(order)),
+    "student": _student,
+    "contaminated": _contaminated,
+}
+
+
+def laplace(deviation: float) -> Noise:
+    """Double exponential with this standard deviation."""
+    return Noise("laplace", deviation / math.sqrt(2.0))
+
+
+def student(deviation: float, freedom: float) -> Noise:
+    """Student's t with this standard deviation: heavy tails, no moments from `freedom` on."""
+    if freedom <= 2.0:
+        raise InputError(f"polynomial: Student's t with {freedom:g} degrees of freedom has no variance; take more than 2")
+    return Noise("student", deviation * math.sqrt((freedom - 2.0) / freedom), (freedom,))
+
+
+def contaminated(deviation: float, share: float, ratio: float) -> Noise:
+    """Normal, but for a share of the numbers, which are `ratio` times as wide; this standard deviation in all."""
+    if not 0.0 < share < 1.0 or ratio <= 0.0:
+        raise InputError(f"polynomial: contaminated noise with a share of {share:g} and a ratio of {ratio:g}; the share is within 0 .. 1, the ratio above 0")
+    return Noise("contaminated", deviation / math.sqrt(1.0 - share + share * ratio**2), (share, ratio))
 
 
 def normal(deviation: float) -> Noise:
