@@ -159,20 +159,8 @@ bool hg_polynomial_valid(const hg_polynomial_config *config)
     return dimensions_fit(config) && lists_valid(config) && numbers_valid(config);
 }
 
-/* Lay arrays out one behind the other. Result: what follows them. */
-static hg_real *lay(hg_real *memory, hg_real **const *array, const uint32_t *size, uint8_t count)
-{
-    uint32_t next = 0U;
-    for (uint8_t i = 0U; i < count; i++) {
-        *array[i] = &memory[next];
-        next += size[i];
-    }
-    return &memory[next];
-}
-
 /* Hand the memory out. What is done with when something else begins lends its place: the powers to what follows from them (they are always longer: tests/unit),
  * the states' polynomials to what the powers are gathered in. */
-/* cppcheck-suppress constParameterPointer ; its pointers are written through the lists */
 static void place(hg_polynomial *self, hg_real *memory)
 {
     const hg_polynomial_config *config = self->config;
@@ -182,20 +170,20 @@ static void place(hg_polynomial *self, hg_real *memory)
     const uint32_t measured = config->measured;
     const uint32_t rows = lifted + measured;
     const uint32_t ring = config->ring;
-    hg_real **const own[] = {&self->x,      &self->Px,   &self->ekf,   &self->c,     &self->Pe,  &self->z,     &self->P, &self->M, &self->mean,  &self->eta, &self->radius,
-                             &self->width, &self->L, &self->slack, &self->weigh, &self->next, &self->root, &self->scale, &self->r, &self->t, &self->Delta, &self->poly};
-    const uint32_t own_size[] = {n, n * n, n, n, n * n, lifted + 1U, HG_POLYNOMIAL_HALF(lifted), HG_POLYNOMIAL_HALF(lifted + 1U), p, p, p,
-                                 p, n * p, rows, rows, lifted + 1U, measured * measured, measured, measured, measured, measured, rows * ring};
-    hg_real **const after_powers[] = {&self->AP, &self->gain, &self->filtered};
-    const uint32_t after_powers_size[] = {rows * lifted, lifted * measured, n * measured};
-    hg_real **const before[] = {&self->shift, &self->term};
-    const uint32_t before_size[] = {n * ring, ring};
-    hg_real **const after[] = {&self->A, &self->J};
-    const uint32_t after_size[] = {rows * (lifted + 1U), HG_POLYNOMIAL_HALF(rows)};
-    hg_real *const shared = lay(memory, own, own_size, 22U);
-    (void)lay(self->poly, after_powers, after_powers_size, 3U);
-    (void)lay(shared, before, before_size, 2U);
-    (void)lay(shared, after, after_size, 2U);
+    hg_real **const array[] = {&self->x,     &self->Px,    &self->ekf,  &self->c,    &self->Pe,    &self->z, &self->P, &self->M,     &self->mean, &self->eta,   &self->radius, &self->width,
+                               &self->L,     &self->slack, &self->weigh, &self->next, &self->root, &self->scale, &self->r, &self->t, &self->Delta, &self->poly, &self->shift,  &self->term};
+    const uint32_t size[] = {n, n * n, n, n, n * n, lifted + 1U, HG_POLYNOMIAL_HALF(lifted), HG_POLYNOMIAL_HALF(lifted + 1U), p, p, p, p,
+                             n * p, rows, rows, lifted + 1U, measured * measured, measured, measured, measured, measured, rows * ring, n * ring, ring};
+    uint32_t next = 0U;
+    for (uint8_t i = 0U; i < 24U; i++) {
+        *array[i] = &memory[next];
+        next += size[i];
+    }
+    self->AP = self->poly;
+    self->gain = &self->AP[rows * lifted];
+    self->filtered = &self->gain[lifted * measured];
+    self->A = self->shift;
+    self->J = &self->A[rows * (lifted + 1U)];
 }
 
 hg_status hg_polynomial_start(hg_polynomial *self, const hg_polynomial_config *config, hg_real *memory, uint32_t length)

@@ -3,7 +3,7 @@
 # make bench-step: one target and model, part by part and function by function.
 
 .PHONY: bench bench-step bench-instructions bench-speed
-bench: bench-instructions bench-peers bench-speed ## instructions of every part on every target, beside other libraries' (FORMAT=markdown); samples a second of campaigns
+bench: bench-instructions bench-filters bench-peers bench-speed ## instructions of every part on every target, beside other libraries' (FORMAT=markdown); samples a second of campaigns
 bench-speed: lib ## plant samples per second and core in a campaign, of every shipped model; fails below 2e5
 	@$(PY) tests/bench/bench.py
 
@@ -95,6 +95,21 @@ bench-step-$(1)-$(3)-$(2): $(BENCH)/$(1)-$(2)/$(3)/drive.elf $(BENCH)/count.so
 	@CROSS=$(CROSS_$(1)) RUN='$(RUN_$(1))' $(PY) tests/bench/step.py $$<
 endef
 $(foreach r,$(BENCH_REALS),$(foreach t,$(TARGETS) x86_64,$(eval $(call bench_target,$(t),$(r)))))
+
+# Filters that no shipped model has a drive for: over the corpus's (tests/target), with the library as the platoon's integrator builds it.
+FILTER_SRC := tests/bench/filters.c tests/target/corpus_polynomial.c tests/target/corpus_fusion.c
+
+.PHONY: bench-filters
+bench-filters: $(BENCH_TARGETS:%=$(BENCH)/%-f32/filters.elf) $(BENCH)/count.so ## instructions of a sample of the polynomial and the fusion filter, on every target
+	@$(PY) tests/bench/filters.py $(if $(FORMAT),--format $(FORMAT)) $(foreach t,$(BENCH_TARGETS),'$(t)=$(CROSS_$(t))=$(RUN_$(t))')
+
+# $(call bench_filters,TARGET)
+define bench_filters
+$(eval $(call objects,$(BENCH)/$(1)-f32,$(FILTER_SRC),$$(call bench_cc,$(1),f32) -Itests/target -I$$(TARGET_TESTS)))
+$(BENCH)/$(1)-f32/filters.elf: $(call bench_objects,$(1)-f32,$(FILTER_SRC) $(LIB_SRC:%=platoon/%) $(call bench_start,$(1))) hal/start/image.ld
+	$$(Q)$$(call cross_cc,$(1)) $$(call BENCH_LINK_$(call bench_libc,$(1)),$(1)) -Wl,-Map=$$(@:.elf=.map) -o $$@ $$(filter %.o,$$^) -lgcc
+endef
+$(foreach t,$(BENCH_TARGETS),$(eval $(call bench_filters,$(t))))
 
 bench-instructions: $(BENCH_REALS:%=bench-instructions-%) ## instructions of every part, on every target, number type after number type
 

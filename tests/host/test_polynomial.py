@@ -182,6 +182,21 @@ def test_a_filter_that_does_not_fit_is_refused_with_what_would() -> None:
         design.make(large, 3)
 
 
+# n, mu, p: bytes in float32 by the method's table of sizes (2.6, reduced), which counts states, covariances, [A; C] and gains of the lifted filter.
+SIZES = {(2, 2, 1): 560, (2, 3, 1): 1600, (4, 2, 1): 3000, (4, 2, 3): 4700, (4, 3, 1): 15900, (4, 3, 3): 24600, (5, 2, 3): 7900, (5, 3, 3): 52000}
+
+
+@pytest.mark.parametrize("shape", SIZES)
+def test_memory_is_that_of_the_method(shape: tuple[int, int, int]) -> None:
+    """Beside what the table counts: the auxiliary filter, and the powers of the polynomials, which the gains need all at once."""
+    n, mu, p = shape
+    rows, ring = design.count(n, mu) - 1 + design.count(p, mu) - 1, design.count(2 * n + p, mu)
+    auxiliary = 2 * n * n + 3 * n + n * p + 4 * p  # x, Px, ekf, c, Pe, L; mean, eta, radius, width
+    found = design.reals(n, p, mu, False)
+    assert found is not None
+    assert 4 * (found - rows * ring - auxiliary) <= 1.05 * SIZES[shape]
+
+
 def test_what_cannot_be_designed_is_refused_in_one_line() -> None:
     x = design.variables(2)
     good = study.suspension("exp")
@@ -224,7 +239,7 @@ def test_abrupt_faults_are_seen_and_false_alarms_are_rare() -> None:
 
 
 def test_false_alarms_are_as_rare_as_promised_whatever_the_noise() -> None:
-    hold(study.promises(study.Study(QUICK // 2, SEED)))
+    hold(study.promises(study.Study(QUICK // 2, MARGIN)))
 
 
 def test_silence_is_worth_its_radius() -> None:

@@ -90,7 +90,8 @@ POLYNOMIAL_TABLES := $(TARGET_TESTS)/polynomial_tables.h
 $(POLYNOMIAL_TABLES): tests/target/polynomial_tables.py host_tools/hullguard/design/polynomial.py host_tools/hullguard/campaign/polynomial_study.py | lib
 	@mkdir -p $(@D)
 	$(Q)PYTHONPATH=host_tools $(PY) $< $@
-$(patsubst %,$(TARGET_TESTS)/%/tests/target/corpus_polynomial.o,host-f32 $(RUN_TARGETS)): $(POLYNOMIAL_TABLES)
+POLYNOMIAL_USERS := $(patsubst %,$(TARGET_TESTS)/%,host-f32 $(RUN_TARGETS)) $(BENCH_TARGETS:%=$(BENCH)/%-f32)
+$(POLYNOMIAL_USERS:%=%/tests/target/corpus_polynomial.o): $(POLYNOMIAL_TABLES)
 
 SEEDED := cortex_m4f
 $(TARGET_TESTS)/seeded.ok: tests/target/seeded tests/target/check_image $(FIRMWARE)/$(SEEDED)/image.ok $(FIRMWARE)/$(SEEDED)-q31/image.ok $(TARGET_TESTS)/$(SEEDED)/corpus.ok

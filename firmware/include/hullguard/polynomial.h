@@ -196,7 +196,8 @@ void hg_polynomial_reset(hg_polynomial *self);
  *  @retval HG_OK          done
  *  @retval HG_E_NUMERIC   a value that is not finite or out of range, or a radius below 0 or NaN: nothing changed; or the state was not finite any more:
  *                         it has begun again (restarts has counted), and nothing is above its level
- *  Cost: (N + measured) times lower (lower + N + measured) multiplications for N, and as much again for the powers; no more than twice that in all. */
+ *  Cost, multiplications: for N, N + measured of every pair of the lower monomials whose parts of the noise are correlated, and lower (N + measured)^2 / 2; for the powers at
+ *  most start[ring] of every row and of every factor of f and h; for J and M+ about 2 (N + measured) N^2. */
 hg_status hg_polynomial_step(hg_polynomial *self, const hg_real *y, const hg_real *radius);
 
 #endif

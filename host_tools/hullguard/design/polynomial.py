@@ -121,8 +121,11 @@ def cut(bound: float, reach: float, order: int) -> float:
 
 @dataclass(frozen=True)
 class Noise:
-    """A distribution without mean. kind: normal, exponential (scale times (Exp(1) - 1)), uniform (+-scale), atoms (values with weights), laplace, student (values: degrees
-    of freedom), contaminated (normal; values: share of the numbers that are so many times as wide)."""
+    """A distribution without mean.
+
+    kind: normal, exponential (scale times (Exp(1) - 1)), uniform (+-scale), atoms (values with weights), laplace, student (values: degrees of freedom), contaminated (normal;
+    values: share of the numbers that are wider, and how many times).
+    """
 
     kind: str
     scale: float = 0.0
