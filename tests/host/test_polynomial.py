@@ -239,7 +239,7 @@ def test_abrupt_faults_are_seen_and_false_alarms_are_rare() -> None:
 
 
 def test_false_alarms_are_as_rare_as_promised_whatever_the_noise() -> None:
-    hold(study.promises(study.Study(QUICK // 2, MARGIN)))
+    hold(study.promises(study.Study(QUICK // 5, MARGIN)))
 
 
 def test_silence_is_worth_its_radius() -> None:
