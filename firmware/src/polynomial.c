@@ -451,33 +451,40 @@ static void take_means(hg_polynomial *self)
     }
 }
 
-/* weigh += worth times the coefficients of monomial j. */
-static void weigh_monomial(hg_polynomial *self, uint16_t j, hg_real worth)
+/* weigh = what monomial i is correlated with: the sum of Cov(nu^b, nu^b') M over the monomials of all rows. */
+static void weigh_monomial(hg_polynomial *self, uint16_t i)
 {
-    const uint8_t rows = all_of(self->config);
-    for (uint8_t a = 0U; a < rows; a++) {
-        self->weigh[a] += worth * self->poly[((uint32_t)a * self->config->ring) + j];
+    const hg_polynomial_config *config = self->config;
+    const uint8_t rows = all_of(config);
+    const hg_real *covariance = &config->covariance[(uint32_t)config->noise[i] * config->noises];
+    fill(self->weigh, HG_REAL_ZERO, rows);
+    for (uint16_t j = 1U; j < config->lower; j++) {
+        const hg_real joint = covariance[config->noise[j]];
+        if (!is_zero(joint)) {
+            const hg_real worth = joint * self->M[half(config->moment[i], config->moment[j])];
+            for (uint8_t a = 0U; a < rows; a++) {
+                self->weigh[a] += worth * self->poly[((uint32_t)a * config->ring) + j];
+            }
+        }
     }
 }
 
-/* J = N: the covariance of the noise that is multiplied by the state. Most pairs of the noise's monomials are uncorrelated. */
+/* J = N: the covariance of the noise that is multiplied by the state. Most pairs of the noise's monomials are uncorrelated, and most rows have few monomials. */
 static void take_noise(hg_polynomial *self)
 {
     const hg_polynomial_config *config = self->config;
     const uint8_t rows = all_of(config);
     fill(self->J, HG_REAL_ZERO, HG_POLYNOMIAL_HALF((uint32_t)rows));
     for (uint16_t i = 1U; i < config->lower; i++) {
-        const hg_real *covariance = &config->covariance[(uint32_t)config->noise[i] * config->noises];
-        fill(self->weigh, HG_REAL_ZERO, rows);
-        for (uint16_t j = 1U; j < config->lower; j++) {
-            const hg_real joint = covariance[config->noise[j]];
-            if (!is_zero(joint)) {
-                weigh_monomial(self, j, joint * self->M[half(config->moment[i], config->moment[j])]);
-            }
-        }
-        for (uint8_t a = 0U; a < rows; a++) {
-            for (uint8_t b = 0U; b <= a; b++) {
-                self->J[half(a, b)] += self->weigh[a] * self->poly[((uint32_t)b * config->ring) + i];
+        if (config->noise[i] != 0U) { /* else it has no noise */
+            weigh_monomial(self, i);
+            for (uint8_t b = 0U; b < rows; b++) {
+                const hg_real factor = self->poly[((uint32_t)b * config->ring) + i];
+                uint32_t at = half(b, b);
+                for (uint32_t a = b; (!is_zero(factor)) && (a < rows); a++) {
+                    self->J[at] += self->weigh[a] * factor;
+                    at += a + 1U; /* down column b */
+                }
             }
         }
     }

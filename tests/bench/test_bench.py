@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from counting import STEP, Call, Function, count, found, functions, of_library, rows, sections, tree
+from filters import POLYNOMIAL, fusion, polynomial
 from needs import needs
 from size import Size, judged, symbols, versions, written
 from stack import StackError, compiled, deepest, disassembled, registers, run_time
@@ -77,6 +78,17 @@ def test_the_tree_of_calls() -> None:
     assert [(c.function.name, c.all) for c in made] == [("a", 20), ("c", 1)]
     assert [(c.function.name, c.all) for c in made[0].walk()] == [("a", 20), ("b", 8), ("c", 5), ("c", 4)]
     assert made[0].has("c") and not made[1].has("a")
+
+
+def test_filters_are_told_apart_by_their_starts() -> None:
+    section = sections(KNOWN.with_suffix(".map"))[0]
+    listed = [Function(f"hg_{name}", i, i + 1, section) for i, name in enumerate(("polynomial_start", "polynomial_step", "fusion_start", "fusion_open", "fusion_due", "consistency_step"))]
+    made = tree(["0 0 90 90", "1 0 5 5", "1 0 7 7", *["0 0 90 90", "1 0 9 9"] * (len(POLYNOMIAL) - 1)], listed)
+    assert list(polynomial(made).values()) == [[5, 7], *[[9]] * (len(POLYNOMIAL) - 1)]
+    with pytest.raises(ValueError, match="zip"):
+        polynomial(made[:3])
+    (each,) = fusion(tree(["2 0 90 90", "3 0 5 5", "4 0 2 2", "5 0 70 70", "3 0 6 6"], listed)).values()
+    assert each == [7, 6]
 
 
 def test_functions_know_their_module() -> None:
