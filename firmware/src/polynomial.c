@@ -170,10 +170,12 @@ static void place(hg_polynomial *self, hg_real *memory)
     const uint32_t measured = config->measured;
     const uint32_t rows = lifted + measured;
     const uint32_t ring = config->ring;
-    hg_real **const array[] = {&self->x,     &self->Px,    &self->ekf,  &self->c,    &self->Pe,    &self->z, &self->P, &self->M,     &self->mean, &self->eta,   &self->radius, &self->width,
-                               &self->L,     &self->slack, &self->weigh, &self->next, &self->root, &self->scale, &self->r, &self->t, &self->Delta, &self->poly, &self->shift,  &self->term};
-    const uint32_t size[] = {n, n * n, n, n, n * n, lifted + 1U, HG_POLYNOMIAL_HALF(lifted), HG_POLYNOMIAL_HALF(lifted + 1U), p, p, p, p,
-                             n * p, rows, rows, lifted + 1U, measured * measured, measured, measured, measured, measured, rows * ring, n * ring, ring};
+    hg_real **const array[] = {&self->x,      &self->Px,    &self->ekf, &self->c,     &self->Pe,    &self->z,    &self->P,    &self->M,
+                               &self->mean,   &self->eta,   &self->radius, &self->width, &self->L,  &self->slack, &self->weigh, &self->next,
+                               &self->root,   &self->scale, &self->r,   &self->t,     &self->Delta, &self->poly, &self->shift, &self->term};
+    const uint32_t size[] = {n, n * n, n, n, n * n, lifted + 1U, HG_POLYNOMIAL_HALF(lifted), HG_POLYNOMIAL_HALF(lifted + 1U),
+                             p, p, p, p, n * p, rows, rows, lifted + 1U,
+                             measured * measured, measured, measured, measured, measured, rows * ring, n * ring, ring};
     uint32_t next = 0U;
     for (uint8_t i = 0U; i < 24U; i++) {
         *array[i] = &memory[next];

@@ -36,6 +36,11 @@ std::vector<int> counted(int first, int count)
     return list;
 }
 
+/* times a number that can be off by so much */
+Sized widened(const Sized &m, double factor, double size) { return {factor * m.value, factor * m.size + size * m.value.cwiseAbs()}; }
+
+Sized nothing(Eigen::Index rows, Eigen::Index columns) { return exact(Matrix::Zero(rows, columns)); }
+
 } // namespace
 
 PolynomialFilter::PolynomialFilter(const PolynomialPlant &plant, int degree, bool bounded, const PolynomialLevels &levels)
@@ -131,13 +136,29 @@ Series PolynomialFilter::put_in(const std::vector<Term> &row, const std::vector<
     return sum;
 }
 
+Matrix PolynomialFilter::slope_at(const Vector &at) const
+{
+    Matrix slope = Matrix::Zero(n_, n_);
+    for (int l = 0; l < n_; ++l) {
+        for (const Term &t : plant_.f[static_cast<size_t>(l)]) {
+            for (size_t i = 0; i < t.factor.size(); ++i) {
+                Term rest = t;
+                rest.factor.erase(rest.factor.begin() + static_cast<std::ptrdiff_t>(i));
+                slope(l, t.factor[i]) += evaluate({rest}, at);
+            }
+        }
+    }
+    return slope;
+}
+
 /* H, F, and the auxiliary filter's own course: its covariance in the short form F1 (Pe - L S L') F1' + Q. */
 void PolynomialFilter::auxiliary(const Vector &y, const Vector &radius, std::vector<Series> &H, std::vector<Series> &F)
 {
-    std::vector<Series> shift(static_cast<size_t>(n_), Series(all_, top_));
+    std::vector<Series> shift;
     for (int l = 0; l < n_; ++l) {
-        shift[static_cast<size_t>(l)].add(0, 0, c.value(l), std::abs(c.value(l)));
-        shift[static_cast<size_t>(l)].add(1, l, 1.0, 1.0);
+        shift.emplace_back(all_, top_);
+        shift.back().add(0, 0, c.value(l), std::abs(c.value(l)));
+        shift.back().add(1, l, 1.0, 1.0);
     }
     eta_ = {Matrix::Zero(p_, 1), Matrix::Zero(p_, 1)};
     std::vector<int> fresh;
@@ -171,29 +192,22 @@ void PolynomialFilter::auxiliary(const Vector &y, const Vector &radius, std::vec
     drift = mean.cwiseAbs2().maxCoeff() * (2.0 - levels_.weight) / levels_.weight;
     ekf = exact(c.value) + L * eta_;
     for (int l = 0; l < n_; ++l) {
-        Series &s = shift[static_cast<size_t>(l)];
+        Series &s = shift[static_cast<size_t>(l)]; /* c' + xi - L H */
         s.drop_constant();
         s.add(0, 0, ekf.value(l), ekf.size(l));
         for (int j = 0; j < p_; ++j) {
             s.add(H[static_cast<size_t>(j)], -L.value(l, j), L.size(l, j));
         }
     }
-    Matrix slope = Matrix::Zero(n_, n_);
     for (int l = 0; l < n_; ++l) {
         F.push_back(put_in(plant_.f[static_cast<size_t>(l)], shift));
         c.size(l) = F.back().size[0](0);
         c.value(l) = F.back().drop_constant();
         F.back().add(1, n_ + l, 1.0, 1.0);
-        for (const Term &t : plant_.f[static_cast<size_t>(l)]) {
-            for (size_t i = 0; i < t.factor.size(); ++i) {
-                Term rest = t;
-                rest.factor.erase(rest.factor.begin() + static_cast<std::ptrdiff_t>(i));
-                slope(l, t.factor[i]) += evaluate({rest}, ekf.value);
-            }
-        }
     }
+    const Matrix slope = slope_at(ekf.value);
     const Sized G = linear_part(F, 0, n_), V = linear_part(F, 2 * n_, p_);
-    const Matrix left = Pe.value - L.value * S.value(Eigen::all, Eigen::all) * L.value.transpose();
+    const Matrix left = Pe.value - L.value * S.value * L.value.transpose();
     const Matrix moved = slope.cwiseAbs() * Pe.value.cwiseAbs() * slope.cwiseAbs().transpose();
     const Sized joseph = G * exact_Pe * transposed(G) + V * diagonal(R) * transposed(V) + diagonal(Q);
     Pe = {slope * left * slope.transpose() + Matrix(Q.asDiagonal()), joseph.size + moved};
@@ -242,7 +256,8 @@ Sized PolynomialFilter::noise_covariance() const
     return sum;
 }
 
-/* s^2 m, of m rows that cut something off (2.2, step 3): a monomial of mu + 1 states is its last times the others, else what it has of noise counts by its root of a mean square. */
+/* s^2 m, of m rows that cut something off (2.2, step 3): a monomial of mu + 1 states is its last times the others, else what it has of noise counts by the root of its
+ * mean square. */
 Sized PolynomialFilter::remainders() const
 {
     const Eigen::Index count = cut_.value.rows();
@@ -266,7 +281,7 @@ Sized PolynomialFilter::remainders() const
     return {cutting * s.value.cwiseAbs2(), 2.0 * cutting * s.value.cwiseProduct(s.size)};
 }
 
-Sized PolynomialFilter::join(const Sized &linear, Sized &N, double &bound, double &bound_size) const
+Sized PolynomialFilter::join(const Sized &linear, const Sized &N, double &bound, double &bound_size) const
 {
     const Sized carried = linear * exact(P.value) * transposed(linear);
     bound = 1.0;
@@ -291,155 +306,149 @@ Sized PolynomialFilter::join(const Sized &linear, Sized &N, double &bound, doubl
     return J;
 }
 
-void PolynomialFilter::update(const Vector &radius, const Sized &whole, const Sized &J, double bound, double bound_size)
+/* Which outputs are worth something: nothing is known of them, or less than is predicted. */
+std::vector<bool> PolynomialFilter::worth(const Vector &radius, const Sized &J)
+{
+    std::vector<bool> found;
+    for (int j = 0; j < p_; ++j) {
+        const auto at = static_cast<Eigen::Index>(X.size()) - 1 + j;
+        const double variance = J.value(at, at), r = radius(j);
+        const bool fresh = r <= levels_.fresh(j);
+        found.push_back(fresh || (std::isfinite(r) && r * r < variance));
+        tie = tie || (!fresh && std::isfinite(r) && std::abs(r * r - variance) < 1e-3 * variance);
+    }
+    return found;
+}
+
+/* Y, how far it can be from that of the true measurement, and what is used of it. */
+PolynomialFilter::Heard PolynomialFilter::hear(const Vector &radius, const Sized &J)
 {
     const int N = static_cast<int>(X.size()) - 1, measured = static_cast<int>(Y.size());
-    const Sized linear{whole.value.rightCols(N), whole.size.rightCols(N)};
-    Sized  Yc{Matrix::Ones(measured, 1), Matrix::Zero(measured, 1)};
-    Vector Delta(measured), Delta_size(measured);
-    std::vector<int> used, judged;
-    std::vector<bool> worth(static_cast<size_t>(p_));
-    double trace = 0.0, square = 0.0, wide = 0.0;
-    for (int j = 0; j < p_; ++j) {
-        const double variance = J.value(N + j, N + j), r = radius(j);
-        const bool fresh = r <= levels_.fresh(j);
-        worth[static_cast<size_t>(j)] = fresh || (std::isfinite(r) && r * r < variance);
-        tie = tie || (!fresh && std::isfinite(r) && std::abs(r * r - variance) < 1e-3 * variance);
-        trace += std::isfinite(r) ? variance : 0.0;
-        wide += (std::isfinite(r) && !fresh) ? r * r : 0.0;
-    }
-    double mean_share = 0.0, off = 0.0;
-    int silent = 0;
+    const std::vector<bool> good = worth(radius, J);
+    Heard  h{{Matrix::Ones(measured, 1), Matrix::Zero(measured, 1)}, {Matrix::Zero(measured, 1), Matrix::Zero(measured, 1)}, {}, {}, 0, 0.0, 0.0};
+    double share = 0.0, off = 0.0;
     for (int k = 0; k < measured; ++k) {
         double most = 1.0, most_size = 0.0;
-        bool use = true;
+        bool   use = true;
         for (int j : Y[static_cast<size_t>(k)]) {
             const double e = eta_.value(j), size = eta_.size(j), r = (radius(j) <= levels_.fresh(j) || !std::isfinite(radius(j))) ? 0.0 : radius(j);
-            Yc.size(k) = std::abs(Yc.value(k)) * size + Yc.size(k) * std::abs(e);
-            Yc.value(k) *= e;
+            h.Y.size(k) = std::abs(h.Y.value(k)) * size + h.Y.size(k) * std::abs(e);
+            h.Y.value(k) *= e;
             most_size = most * (size + r) + most_size * (std::abs(e) + r);
             most *= std::abs(e) + r;
-            use = use && worth[static_cast<size_t>(j)];
+            use = use && good[static_cast<size_t>(j)];
         }
-        Delta(k) = most - std::abs(Yc.value(k));
-        Delta_size(k) = most_size + Yc.size(k);
-        if (Delta(k) <= 0.0) {
-            Delta_size(k) = 0.0;
-        }
+        h.Delta.value(k) = most - std::abs(h.Y.value(k));
+        h.Delta.size(k) = (h.Delta.value(k) > 0.0) ? most_size + h.Y.size(k) : 0.0;
         if (use) {
-            used.push_back(k);
-            if (static_cast<int>(Y[static_cast<size_t>(k)].size()) <= 2) {
-                judged.push_back(static_cast<int>(used.size()) - 1);
+            const double D = h.Delta.value(k), variance = J.value(N + k, N + k);
+            h.used.push_back(k);
+            if (Y[static_cast<size_t>(k)].size() <= 2) {
+                h.judged.push_back(static_cast<int>(h.used.size()) - 1);
             }
-            silent += (Delta(k) > 0.0) ? 1 : 0;
-            mean_share += Delta(k) * Delta(k) / J.value(N + k, N + k);
-            off = std::max(off, 2.0 * part(Delta_size(k), Delta(k)) + part(J.size(N + k, N + k), J.value(N + k, N + k)));
+            h.silent += (D > 0.0) ? 1 : 0;
+            share += D * D / variance;
+            off = std::max(off, 2.0 * part(h.Delta.size(k), D) + part(J.size(N + k, N + k), variance));
         }
     }
-    const double d = (silent > 0) ? split_weight(mean_share * silent / static_cast<double>(used.size())) : 0.0, d_size = 0.5 * d * off;
-    double wider = 1.0 + d;
-    const Sized ahead = whole * exact(z.value);
-    const Sized r{Yc.value - ahead.value.bottomRows(measured), Yc.size + ahead.size.bottomRows(measured)};
+    h.d = (h.silent > 0) ? split_weight(share * h.silent / static_cast<double>(h.used.size())) : 0.0;
+    h.d_size = 0.5 * h.d * off;
+    return h;
+}
+
+/* Covariance of what is used, with Delta in it. */
+Sized PolynomialFilter::spread(const Heard &h, const Sized &J, const std::vector<int> &rows) const
+{
+    Sized S = widened(chosen(J, rows, rows), 1.0 + h.d, h.d_size);
+    for (size_t i = 0; i < h.used.size() && h.silent > 0; ++i) {
+        const auto at = static_cast<Eigen::Index>(i);
+        const double D = h.Delta.value(h.used[i]), D_size = h.Delta.size(h.used[i]);
+        S.value(at, at) += (1.0 + 1.0 / h.d) * h.silent * D * D;
+        S.size(at, at) += (1.0 + 1.0 / h.d) * h.silent * 2.0 * D * D_size + (h.d_size / (h.d * h.d)) * h.silent * D * D;
+    }
+    return S;
+}
+
+void PolynomialFilter::judge(const Vector &radius, const Sized &r, const Sized &J)
+{
+    double trace = 0.0, square = 0.0, wide = 0.0;
     for (int j = 0; j < p_; ++j) {
-        square += std::isfinite(radius(j)) ? r.value(j) * r.value(j) : 0.0;
+        const auto at = static_cast<Eigen::Index>(X.size()) - 1 + j;
+        if (std::isfinite(radius(j))) {
+            trace += J.value(at, at);
+            square += r.value(j) * r.value(j);
+            wide += (radius(j) > levels_.fresh(j)) ? radius(j) * radius(j) : 0.0;
+        }
     }
     plain = std::sqrt(square);
     threshold = levels_.kappa * std::sqrt(trace) + std::sqrt(wide);
-    std::vector<int> rows;
-    for (int k : used) {
-        rows.push_back(N + k);
-    }
-    const std::vector<int> states = counted(0, n_), lifted = counted(0, N);
-    Sized K{Matrix::Zero(N, measured), Matrix::Zero(N, measured)}, Kf{Matrix::Zero(n_, measured), Matrix::Zero(n_, measured)};
     joint = exact(Matrix::Zero(1, 1));
-    x = Sized{c.value, c.value.cwiseAbs()}; /* step() puts the point of expansion here */
-    Sized Pn = chosen(exact(P.value), states, states), Jx = chosen(J, lifted, lifted);
-    Sized taken{Matrix::Zero(N, N), Matrix::Zero(N, N)}, taken_f{Matrix::Zero(n_, n_), Matrix::Zero(n_, n_)};
-    Sized move{Matrix::Zero(N, 1), Matrix::Zero(N, 1)}, move_f{Matrix::Zero(n_, 1), Matrix::Zero(n_, 1)};
-    held = false;
-    if (!used.empty()) {
-        Sized S = chosen(J, rows, rows), Jxy = chosen(J, lifted, rows);
-        S.size = wider * S.size + d_size * S.value.cwiseAbs();
-        S.value *= wider;
-        Jxy.size = wider * Jxy.size + d_size * Jxy.value.cwiseAbs();
-        Jxy.value *= wider;
-        for (size_t i = 0; i < used.size() && silent > 0; ++i) {
-            const auto at = static_cast<Eigen::Index>(i);
-            const double D = Delta(used[i]), D_size = Delta_size(used[i]);
-            S.value(at, at) += (1.0 + 1.0 / d) * silent * D * D;
-            S.size(at, at) += (1.0 + 1.0 / d) * silent * 2.0 * D * D_size + (d_size / (d * d)) * silent * D * D;
-        }
-        const std::vector<int> none{0};
-        const Sized ru = chosen(r, used, none);
-        const Sized carried = exact(P.value) * transposed(chosen(linear, rows, lifted));
-        Sized Pxy = chosen(carried, states, counted(0, static_cast<int>(used.size())));
-        const double scale = wider * bound, scale_size = d_size * bound + wider * bound_size;
-        Pxy.size = scale * Pxy.size + scale_size * Pxy.value.cwiseAbs();
-        Pxy.value *= scale;
-        K = divided(Jxy, S);
-        Kf = divided(Pxy, S);
-        const Sized rt = transposed(ru);
-        const Sized rj = chosen(rt, none, judged), Sj = chosen(S, judged, judged);
-        joint = divided(rj, Sj) * transposed(rj);
-        taken = K * transposed(Jxy);
-        taken_f = Kf * transposed(Pxy);
-        move = K * ru;
-        move_f = Kf * ru;
-        const Vector after = scale * Pn.value.diagonal() - taken_f.value.diagonal();
-        const double left = after.cwiseQuotient(bound * Pn.value.diagonal()).sum();
-        held = wider > 1.0 && left >= n_;
-        tie = tie || (wider > 1.0 && std::abs(left - n_) < 1e-3 * n_);
-        if (held) {
-            wider = 1.0;
-            for (Sized *s : {&taken, &taken_f, &move, &move_f}) {
-                s->value.setZero();
-                s->size.setZero();
-            }
-        }
-    } else {
-        wider = 1.0;
-    }
-    const double scale = wider * bound, scale_size = d_size * bound + wider * bound_size;
-    x = x + Sized{z.value.middleRows(1, n_), z.value.middleRows(1, n_).cwiseAbs()} + move_f;
-    Px = {scale * Pn.value - taken_f.value, scale * Pn.size + scale_size * Pn.value.cwiseAbs() + taken_f.size};
-    z.value.bottomRows(N) = ahead.value.topRows(N) + move.value;
-    z.size.bottomRows(N) = ahead.size.topRows(N) + move.size;
-    P = {wider * Jx.value - taken.value, wider * Jx.size + d_size * Jx.value.cwiseAbs() + taken.size};
 }
 
-void PolynomialFilter::step(const Vector &y, const Vector &radius)
+/* What the measurements move estimate and prediction by, and take from their covariances. */
+PolynomialFilter::Gained PolynomialFilter::gain(const Heard &h, const Sized &linear, const Sized &J, const Sized &r, double bound, double bound_size)
 {
-    tie = false;
-    const Sized before = exact(c.value);
-    std::vector<Series> H, F, rows;
-    auxiliary(y, radius, H, F);
-    const Sized next = c;
-    for (size_t a = 1; a < X.size(); ++a) {
-        Series product = F[static_cast<size_t>(X[a][0])];
-        for (size_t i = 1; i < X[a].size(); ++i) {
-            product = product * F[static_cast<size_t>(X[a][i])];
-        }
-        rows.push_back(product);
+    const int N = static_cast<int>(X.size()) - 1;
+    const std::vector<int> none{0}, states = counted(0, n_), lifted = counted(0, N);
+    std::vector<int> rows;
+    for (int k : h.used) {
+        rows.push_back(N + k);
     }
-    for (const Tuple &t : Y) {
-        Series product = H[static_cast<size_t>(t[0])];
+    const double wider = 1.0 + h.d;
+    const Sized  S = spread(h, J, rows), Jxy = widened(chosen(J, lifted, rows), wider, h.d_size);
+    const Sized  carried = exact(P.value) * transposed(chosen(linear, rows, lifted));
+    const Sized  Pxy = widened(chosen(carried, states, counted(0, static_cast<int>(rows.size()))), wider * bound, h.d_size * bound + wider * bound_size);
+    const Sized  used = chosen(r, h.used, none), judged = chosen(transposed(used), none, h.judged);
+    const Sized  K = divided(Jxy, S), Kf = divided(Pxy, S);
+    joint = divided(judged, chosen(S, h.judged, h.judged)) * transposed(judged);
+    Gained made{K * used, Kf * used, K * transposed(Jxy), Kf * transposed(Pxy), wider};
+    const Vector before = bound * P.value.diagonal().head(n_), after = wider * before - Vector(made.taken_f.value.diagonal());
+    const double left = after.cwiseQuotient(before).sum();
+    held = wider > 1.0 && left >= n_;
+    tie = tie || (wider > 1.0 && std::abs(left - n_) < 1e-3 * n_);
+    return made;
+}
+
+void PolynomialFilter::update(const Vector &radius, const Sized &whole, const Sized &J, double bound, double bound_size)
+{
+    const int N = static_cast<int>(X.size()) - 1, measured = static_cast<int>(Y.size());
+    const Heard h = hear(radius, J);
+    const Sized ahead = whole * exact(z.value), linear{whole.value.rightCols(N), whole.size.rightCols(N)};
+    const Sized r{h.Y.value - ahead.value.bottomRows(measured), h.Y.size + ahead.size.bottomRows(measured)};
+    judge(radius, r, J);
+    held = false;
+    Gained g{nothing(N, 1), nothing(n_, 1), nothing(N, N), nothing(n_, n_), 1.0};
+    if (!h.used.empty()) {
+        const Gained made = gain(h, linear, J, r, bound, bound_size);
+        g = held ? g : made;
+    }
+    const double d_size = (g.wider > 1.0) ? h.d_size : 0.0;
+    const std::vector<int> states = counted(0, n_), lifted = counted(0, N);
+    const Sized Pn = widened(chosen(exact(P.value), states, states), g.wider * bound, d_size * bound + g.wider * bound_size);
+    const Sized Jx = widened(chosen(J, lifted, lifted), g.wider, d_size);
+    x = exact(c.value) + exact(z.value.middleRows(1, n_)) + g.move_f; /* c is still the point of expansion */
+    Px = {Pn.value - g.taken_f.value, Pn.size + g.taken_f.size};
+    z.value.bottomRows(N) = ahead.value.topRows(N) + g.move.value;
+    z.size.bottomRows(N) = ahead.size.topRows(N) + g.move.size;
+    P = {Jx.value - g.taken.value, Jx.size + g.taken.size};
+}
+
+std::vector<Series> PolynomialFilter::powers(const std::vector<Tuple> &of, const std::vector<Series> &variables)
+{
+    std::vector<Series> found;
+    for (const Tuple &t : of) {
+        found.push_back(variables[static_cast<size_t>(t[0])]);
         for (size_t i = 1; i < t.size(); ++i) {
-            product = product * H[static_cast<size_t>(t[i])];
+            found.back() = found.back() * variables[static_cast<size_t>(t[i])];
         }
-        rows.push_back(product);
     }
-    split(rows);
-    const auto count = static_cast<Eigen::Index>(rows.size());
+    return found;
+}
+
+/* [1 m'; m A M A' + N] */
+Sized PolynomialFilter::moments_after(const Sized &linear, const Sized &covariance) const
+{
     const Eigen::Index wide = M.value.rows(), N = wide - 1;
-    Sized linear{Matrix::Zero(count, wide), Matrix::Zero(count, wide)};
-    for (size_t b = 0; b < noises_.size(); ++b) {
-        linear.value += noise_mean_[b] * by_noise_[b].value;
-        linear.size += std::abs(noise_mean_[b]) * by_noise_[b].size;
-    }
-    Sized covariance = noise_covariance();
-    const Sized states{linear.value.rightCols(N), linear.size.rightCols(N)};
-    double bound = 1.0, bound_size = 0.0;
-    const Sized J = join(states, covariance, bound, bound_size);
     const Sized upper{linear.value.topRows(N), linear.size.topRows(N)};
     const Sized carried = upper * exact(M.value) * transposed(upper), first = upper * exact(M.value.col(0));
     Sized moved = exact(Matrix::Ones(wide, wide));
@@ -449,6 +458,32 @@ void PolynomialFilter::step(const Vector &y, const Vector &radius)
     moved.size.block(1, 0, N, 1) = first.size;
     moved.value.block(0, 1, 1, N) = first.value.transpose();
     moved.size.block(0, 1, 1, N) = first.size.transpose();
+    return moved;
+}
+
+void PolynomialFilter::step(const Vector &y, const Vector &radius)
+{
+    tie = false;
+    const Sized before = exact(c.value);
+    std::vector<Series> H, F;
+    auxiliary(y, radius, H, F);
+    const Sized next = c;
+    std::vector<Series> rows = powers(std::vector<Tuple>(X.begin() + 1, X.end()), F);
+    for (const Series &s : powers(Y, H)) {
+        rows.push_back(s);
+    }
+    split(rows);
+    const auto count = static_cast<Eigen::Index>(rows.size());
+    const Eigen::Index wide = M.value.rows(), N = wide - 1;
+    Sized linear{Matrix::Zero(count, wide), Matrix::Zero(count, wide)};
+    for (size_t b = 0; b < noises_.size(); ++b) {
+        linear.value += noise_mean_[b] * by_noise_[b].value;
+        linear.size += std::abs(noise_mean_[b]) * by_noise_[b].size;
+    }
+    const Sized states{linear.value.rightCols(N), linear.size.rightCols(N)}, covariance = noise_covariance();
+    double bound = 1.0, bound_size = 0.0;
+    const Sized J = join(states, covariance, bound, bound_size);
+    const Sized moved = moments_after(linear, covariance);
     c = before;
     update(radius, linear, J, bound, bound_size);
     c = next;

@@ -213,7 +213,26 @@ private:
     void   split(const std::vector<Series> &rows);
     Sized  noise_covariance() const;
     Sized  remainders() const;
-    Sized  join(const Sized &linear, Sized &N, double &bound, double &bound_size) const;
+    Sized  join(const Sized &linear, const Sized &N, double &bound, double &bound_size) const;
+    struct Heard {
+        Sized            Y, Delta;
+        std::vector<int> used, judged; /* places in Y, places in used */
+        int              silent;
+        double           d, d_size;
+    };
+    struct Gained {
+        Sized  move, move_f, taken, taken_f; /* of the prediction, _f of the estimate */
+        double wider;
+    };
+
+    Matrix slope_at(const Vector &at) const;
+    static std::vector<Series> powers(const std::vector<Tuple> &of, const std::vector<Series> &variables);
+    Sized  moments_after(const Sized &linear, const Sized &covariance) const;
+    std::vector<bool> worth(const Vector &radius, const Sized &J);
+    Heard  hear(const Vector &radius, const Sized &J);
+    Sized  spread(const Heard &h, const Sized &J, const std::vector<int> &rows) const;
+    void   judge(const Vector &radius, const Sized &r, const Sized &J);
+    Gained gain(const Heard &h, const Sized &linear, const Sized &J, const Sized &r, double bound, double bound_size);
     void   update(const Vector &radius, const Sized &whole, const Sized &J, double bound, double bound_size);
 
     int                n_, p_, mu_, all_, top_; /* all: variables of s */
