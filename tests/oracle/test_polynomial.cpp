@@ -27,6 +27,7 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::infinity();
 constexpr double far     = 10.0;
+constexpr double lost    = 1e4; /* sum of all variances */
 constexpr double memory  = 10.0; /* samples in which both filters forget a rounding */
 
 double near(double x) { return static_cast<double>(nearest(x)); }
@@ -327,7 +328,8 @@ struct Compared {
                 const double off = std::abs(found(i, j) - expected.value(i, j)), tolerance = share * expected.size(i, j) + std::numeric_limits<double>::min();
                 if (!(off <= worst * tolerance)) {
                     worst = off / tolerance;
-                    what = say("%s(%d, %d): %.12g, the oracle has %.12g, tolerance %.3g", name, static_cast<int>(i), static_cast<int>(j), found(i, j), expected.value(i, j), tolerance);
+                    what = say("%s(%d, %d): %.12g, the oracle has %.12g, tolerance %.3g", name,
+                               static_cast<int>(i), static_cast<int>(j), found(i, j), expected.value(i, j), tolerance);
                 }
             }
         }
@@ -390,7 +392,7 @@ struct Course {
 
 struct Seen {
     double worst = 0.0;
-    long   silent = 0, held = 0;
+    long   silent = 0, held = 0, samples = 0;
 };
 
 /* A plant's measurements with what is known of them. */
@@ -453,10 +455,11 @@ std::string one_by_one(Random &random, const Course &course, Seed seed, Seen &se
     for (int k = 0; k < course.samples; ++k) {
         Vector y, radius;
         drive.next(y, radius);
-        if (!(y.cwiseAbs().maxCoeff() < far)) { /* a random plant has run away */
+        follow(o, library.self);
+        if (!(y.cwiseAbs().maxCoeff() < far) || !(o.P.value.trace() < lost)) { /* a random plant has run away, or its filter */
             break;
         }
-        follow(o, library.self);
+        seen.samples++;
         const unsigned dropped = library.self.dropped, held = library.self.held;
         if (give(library.self, y, radius) != HG_OK) {
             return say("sample %d was refused", k);
@@ -541,6 +544,9 @@ std::string all_named(bool alone)
                 if (!found.empty()) {
                     return say("%s degree %d%s: ", names[i], mu, bounded ? " bounded" : "") + found;
                 }
+                if (!alone && seen.samples != course.samples) {
+                    return say("%s degree %d%s: ended after %ld samples", names[i], mu, bounded ? " bounded" : "", seen.samples);
+                }
             }
         }
     }
@@ -563,7 +569,7 @@ std::string all_random()
             return say("plant %d (%d states, %d outputs, degree %d%s): ", i, n, p, mu, course.bounded ? " bounded" : "") + found;
         }
     }
-    std::printf("%d random plants: %ld samples with a radius, %ld held; at most %.3g of the tolerance\n", problems / 10, seen.silent, seen.held, seen.worst);
+    std::printf("%d random plants: %ld samples, %ld with a radius, %ld held; at most %.3g of the tolerance\n", problems / 10, seen.samples, seen.silent, seen.held, seen.worst);
     return (seen.held > 0 || problems < 300) ? std::string() : std::string("no update was held");
 }
 
