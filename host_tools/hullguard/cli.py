@@ -93,6 +93,7 @@ def _drive(parser: argparse.ArgumentParser) -> None:
 
 def build_parser() -> argparse.ArgumentParser:
     """All options of all subcommands."""
+    from hullguard.identify import arguments as identify
     from hullguard.inject import arguments as inject  # slow: what it needs is imported where a Ctrl-C is told in one line
 
     parser = _Parser(
@@ -193,6 +194,11 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
 
+    p = add("identify", "bounds of disturbances, noise and slews, and trigger settings, from recordings without faults: a model that is ready for design")
+    p.epilog = identify.EPILOG
+    identify.add_arguments(p, _seed)
+    _output(p)
+
     p = add("convert", "recordings of CAN frames from one format into another, by suffix: .log (candump -L), .pcap, .pcapng, .blf, .mf4, .asc")
     p.add_argument("source", metavar="IN", help="recording to read")
     p.add_argument("target", metavar="OUT", help="file to write; with --dbc it may be .csv: signals for PlotJuggler")
@@ -214,6 +220,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
+    from hullguard.identify.command import run_identify
     from hullguard.inject.command import run_inject
     from hullguard.monitor.command import run_monitor
 
@@ -226,6 +233,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
+        "identify": run_identify,
         "convert": commands.run_convert,
         "inject": run_inject,
         "report": commands.run_report,
