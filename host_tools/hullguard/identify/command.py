@@ -349,17 +349,15 @@ def describe(result: dict[str, Any]) -> list[str]:
 
 def _judge(found: Found, outcome: Outcome) -> int:
     """Status 1 where the recordings do not keep within what was found."""
+    if found.margin is not None and found.margin.factor > 1.0:
+        place = f"{found.margin.record}:{found.margin.line}"
+        raise ExpectationError(f"the held-out part needs {found.margin.factor:.3g} times the bounds ({place}); give a larger --margin, or a longer recording")
     factor, signal = outcome.moved
     if factor > 1.0:
         declared = next(s.slew for s in outcome.design.model.signals if s.name == signal) is not None
         cure = "give a larger --slew-margin" if declared else "declare its slew as a list: it does not move as [plant] feedback says"
         raise ExpectationError(f"'{signal}' moves {factor:.3g} times as fast as its slew; {cure}")
-    if found.margin is None or outcome.held is None:
-        return 0
-    if found.margin.factor > 1.0:
-        place = f"{found.margin.record}:{found.margin.line}"
-        raise ExpectationError(f"the held-out part needs {found.margin.factor:.3g} times the bounds ({place}); give a larger --margin, or a longer recording")
-    if outcome.held.provisional:
+    if outcome.held is not None and outcome.held.provisional:
         kept = "what the model gives and identify does not look for (state_range, noise of inputs, matrices) is too narrow"
         raise ExpectationError(f"{outcome.held.provisional} false alarms in the held-out part: {kept}")
     return 0

@@ -65,9 +65,9 @@ class Parity:
         return np.asarray((stacked[0] - stacked[1] @ self.driven(plant.B, plant.D).T) @ self.null)
 
 
-def window_length(plant: Plant, rows: int = ROWS) -> int:
-    """As many samples as give about this many residuals, and at least one more than the state needs."""
-    return max(min(rows // plant.m, LONGEST), -(-plant.n // plant.m) + 2)
+def window_length(plant: Plant) -> int:
+    """As many samples as give about ROWS residuals, and at least one more than the state needs."""
+    return max(min(ROWS // plant.m, LONGEST), -(-plant.n // plant.m) + 2)
 
 
 def shares(found: Structure, records: Sequence[Record]) -> Shares:
@@ -99,8 +99,8 @@ def shares(found: Structure, records: Sequence[Record]) -> Shares:
 
 
 def disagreement(plant: Plant, records: Sequence[tuple[Array, Array]]) -> float:
-    """Logarithm of the volume that the parity residuals of short windows fill: the likelihood of lags is the smaller, the larger it is."""
-    parity = Parity.of(plant, window_length(plant, 0))
+    """Logarithm of the volume that the parity residuals fill, a sample: lags are the less likely, the larger it is."""
+    parity = Parity.of(plant, window_length(plant))
     zeta = np.vstack([parity.residuals(plant, y, u) for y, u in records])
     S = zeta.T @ zeta / len(zeta)
-    return float(np.linalg.slogdet(S + 1e-14 * np.trace(S) / len(S) * np.eye(len(S)))[1])
+    return float(np.linalg.slogdet(S + 1e-14 * np.trace(S) / len(S) * np.eye(len(S)))[1]) / parity.length

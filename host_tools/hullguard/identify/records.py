@@ -14,7 +14,7 @@ from hullguard.model.table import Array
 from hullguard.plant.recording import read_recording
 
 SHORTEST = 100  # samples of a part: below that nothing is found that would hold
-GAIN = 0.1  # by which the volume of residuals has to shrink, in its logarithm, for a lag to be believed
+GAIN = 0.02  # by which the volume of residuals has to shrink, in its logarithm a sample, for a lag to be believed
 
 
 @dataclass(frozen=True)

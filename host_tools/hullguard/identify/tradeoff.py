@@ -20,7 +20,7 @@ from hullguard.model.schema import Model, Reference
 from hullguard.model.table import Array
 
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)
-STEPS = 7  # of the search between two of them
+STEPS = 5  # of the search between two of them
 FORGOTTEN = 1e-9
 LENGTH_MAX = 20_000
 REST = Reference("rest", 0.0, 1)
