@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from test_bad_input import refused
 
 from hullguard.core.library import library
 from hullguard.core.native import Batch, Native
-from hullguard.identify import bounds, records
+from hullguard.errors import InputError
+from hullguard.identify import bounds, records, tradeoff
 from hullguard.identify.moments import disagreement, shares
 from hullguard.identify.programme import Window
 from hullguard.identify.records import Record
@@ -96,7 +98,7 @@ def test_triggers_are_chosen_for_a_wish(cli: Cli, tmp_path: Path, given: Path, d
     path = write_csv(tmp_path / "drive.csv", model, series[:400])
     options = ("identify", given, "--csv", path, "--out", tmp_path / "out", "--json", "--force", "--hold-out", 0)
     least = cli(*options, "--bus-load", 0.3).json
-    assert least["fitted"]["frames"] <= 0.3 and least["chosen"] > 1.0
+    assert 0.28 <= least["fitted"]["frames"] <= 0.3
     sigma = float(load_model(str(tmp_path / "out" / "mine.toml")).groups[0].trigger.sigma[0, 0])
     assert sigma == pytest.approx(0.05 * least["chosen"], rel=0.01)
     sizes = [p["smallest_fault"]["controller1"] for p in least["trade_off"]]
@@ -104,6 +106,28 @@ def test_triggers_are_chosen_for_a_wish(cli: Cli, tmp_path: Path, given: Path, d
     assert frames == sorted(frames, reverse=True) and sizes[-1] > sizes[0]
     line = refused(cli(*options, "--bus-load", 0.05), 2, "--bus-load 0.05", "interval_max")
     assert "0.2" in line
+
+
+def test_the_widest_triggers_that_show_a_fault_are_searched_for(monkeypatch: pytest.MonkeyPatch, models: Models) -> None:
+    """With a curve known in closed form: frames 1 / (1 + scale), smallest fault 0.3 + scale."""
+    made = models.design()
+
+    def point(model: Model, stored: object, parts: object, scale: float) -> tradeoff.Point:
+        return tradeoff.Point(scale, tradeoff.Drive(1 / (1 + scale), 0, 0, 0.5), {"f": 0.3 + scale}, made)
+
+    monkeypatch.setattr(tradeoff, "point", point)
+    curve = tradeoff.Curve(made.model, made.stored, [], quiet)
+    fine = tradeoff.chosen(curve, made.model, None, ("f", 1.7))
+    assert fine is not None and 1.4 / 1.03 <= fine.scale <= 1.4
+    few = tradeoff.chosen(curve, made.model, 0.4, None)
+    assert few is not None and 1.5 <= few.scale <= 1.5 * 1.03
+    assert tradeoff.chosen(curve, made.model, None, None) is None
+    for load, fault, word in ((0.1, None, "--bus-load 0.1"), (None, ("f", 0.4), "--smallest-fault f:0.4")):
+        with pytest.raises(InputError, match=word):
+            tradeoff.chosen(curve, made.model, load, fault)
+    closed = replace(made.model, groups=tuple(g for g in made.model.groups if g.closing))
+    with pytest.raises(InputError, match="no trigger to choose"):
+        tradeoff.chosen(tradeoff.Curve(closed, made.stored, [], quiet), closed, 0.5, None)
 
 
 def test_a_row_that_contradicts_the_model_is_named(drive: tuple[Model, Array]) -> None:
