@@ -26,6 +26,14 @@ openacc: ## the openacc model on a recorded drive: make openacc DATA=FILE.csv
 	@test -n "$(DATA)" || { echo "make openacc needs a recording: make openacc DATA=FILE.csv" >&2; exit 2; }
 	@$(PY) tests/openacc/openacc.py $(DATA)
 
+.PHONY: openacc-identify
+openacc-identify: lib ## bounds of the openacc model from the first half of a recorded drive, checked on the rest: make openacc-identify DATA=FILE.csv
+	@test -n "$(DATA)" || { echo "make openacc-identify needs a recording: make openacc-identify DATA=FILE.csv" >&2; exit 2; }
+	@$(HULLGUARD) identify openacc --csv $(DATA) --noise --margin 0.2 --out $(BUILD)/openacc-identify --force
+	@$(HULLGUARD) design $(BUILD)/openacc-identify/openacc.toml --quiet --out $(BUILD)/openacc-identify
+	@$(HULLGUARD) replay $(BUILD)/openacc-identify/openacc.toml --csv $(DATA) --noise --bus inprocess --json --expect quiet >$(BUILD)/openacc-identify/replay.json
+	@echo "  ok  no alarm in a replay of the whole drive"
+
 .PHONY: openacc-generated
 openacc-generated: lib
 	@$(PY) tests/openacc/openacc.py --generated --misses $(BUILD)/openacc-generated-misses.txt

@@ -93,7 +93,9 @@ def _drive(parser: argparse.ArgumentParser) -> None:
 
 def build_parser() -> argparse.ArgumentParser:
     """All options of all subcommands."""
+    from hullguard.identify import arguments as identify
     from hullguard.inject import arguments as inject  # slow: what it needs is imported where a Ctrl-C is told in one line
+    from hullguard.new import arguments as new
 
     parser = _Parser(
         prog="hullguard", description="Event-triggered, set-based fault detection on ECUs over CAN.", epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -193,6 +195,16 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=_positive, default=30, metavar="N", help="samples that the limit looks at (default 30)")
     p.add_argument("--workers", type=_positive, metavar="N", help="processes (default: one a core); results do not depend on it")
 
+    p = add("new", "a first model file from matrices, a state-space file or a builder; asks where nothing is given")
+    p.epilog = new.EPILOG
+    new.add_arguments(p)
+    _output(p)
+
+    p = add("identify", "bounds of disturbances, noise and slews, and trigger settings, from recordings without faults: a model that is ready for design")
+    p.epilog = identify.EPILOG
+    identify.add_arguments(p, _seed)
+    _output(p)
+
     p = add("convert", "recordings of CAN frames from one format into another, by suffix: .log (candump -L), .pcap, .pcapng, .blf, .mf4, .asc")
     p.add_argument("source", metavar="IN", help="recording to read")
     p.add_argument("target", metavar="OUT", help="file to write; with --dbc it may be .csv: signals for PlotJuggler")
@@ -220,8 +232,10 @@ def build_parser() -> argparse.ArgumentParser:
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
     from hullguard.codegen.amalgam import run_amalgam
+    from hullguard.identify.command import run_identify
     from hullguard.inject.command import run_inject
     from hullguard.monitor.command import run_monitor
+    from hullguard.new.command import run_new
 
     return {
         "design": commands.run_design,
@@ -232,6 +246,8 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "monitor": run_monitor,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
+        "new": run_new,
+        "identify": run_identify,
         "convert": commands.run_convert,
         "amalgam": run_amalgam,
         "inject": run_inject,

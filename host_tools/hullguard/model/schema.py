@@ -293,6 +293,11 @@ def _read_file(path: Path) -> dict[str, Any]:
     return _over(data, beneath)
 
 
+def source(path: Path) -> dict[str, Any]:
+    """A model file's data as written, over that of the model it is based on: nothing expanded, nothing checked."""
+    return _read_file(path)
+
+
 def _over(data: dict[str, Any], beneath: dict[str, Any]) -> dict[str, Any]:
     """Tables are merged, everything else replaces what is beneath."""
     merged = dict(beneath)

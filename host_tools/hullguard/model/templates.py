@@ -22,7 +22,7 @@ from hullguard.model.builders import BUILDERS, SIZE_MAX
 from hullguard.model.table import Table
 
 _PLACE = re.compile(r"\{(\w*)\}")
-_STEM = re.compile(r"^[a-z_]*[a-z]")  # what a name is before its number
+STEM = re.compile(r"^[a-z_]*[a-z]")  # what a name is before its number
 
 Instance = dict[str, int]
 Families = dict[str, list[Instance]]
@@ -181,7 +181,7 @@ def _vector(given: dict[str, Any], names: Any, where: str) -> list[Any]:
         raise InputError(f"{where}: by name, it needs a [plant] builder or states = [..]; give a list of numbers")
     made, used = [], set()
     for name in names:
-        stem = _STEM.match(name)
+        stem = STEM.match(name)
         key = name if name in given else stem[0] if stem else name
         if key not in given:
             raise InputError(f"{where}: nothing for '{name}'; give '{key}' or '{name}'")

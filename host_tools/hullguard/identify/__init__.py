@@ -1,0 +1,1 @@
+"""Bounds of a plant from fault-free recordings."""

@@ -1,0 +1,1 @@
+"""A first model file."""
