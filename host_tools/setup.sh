@@ -93,6 +93,8 @@ ready() {
 
 make_venv() {
     local python output
+    # It is made empty first: through a link that would be somebody else's.
+    [ ! -L "$venv" ] || fail ".venv is a link to $(readlink -f "$venv"), which was not made for this folder; remove the link and run this again"
     python=$(find_python) || exit 2
     say "making .venv with $("$python" --version)"
     output=$("$python" -m venv --clear "$venv" 2>&1) \
