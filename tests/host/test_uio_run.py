@@ -217,16 +217,19 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"detector.prediction": True}, r"detector\.prediction cannot be had"),
     ({"detector.threshold": "zonotope"}, r"detector\.threshold cannot be had"),
     ({"detector.uio": []}, "0 observers; 1 .. 32 are possible"),
-    ({"detector.uio.0.poles": [-1, 2, -3, -4]}, r"poles: 2 does not die out"),
-    ({"detector.uio.0.poles": [[-1, 2], -3, -4]}, "comes without its conjugate"),
-    ({"detector.uio.0.poles": [-1, -2]}, "2 poles, 4 can be chosen; none is fixed"),
-    ({"detector.uio.0.poles": {"slow": -20, "fast": -10}}, "fast = -10 is not left of slow = -20"),
-    ({"detector.uio.0.poles": "fast"}, "expected a list of poles"),
-    ({"detector.uio.0.poles": [-20, -20, -20, -20, -20]}, "5 poles, 4 can be chosen"),
+    ({"detector.uio.1.poles": [-1, 2, -3, -4]}, r"poles: 2 does not die out"),
+    ({"detector.uio.1.poles": [[-1, 2], -3, -4]}, "comes without its conjugate"),
+    ({"detector.uio.1.poles": [-1, -2]}, "2 poles, 5 can be chosen; none is fixed"),
+    ({"detector.uio.1.poles": {"slow": -20, "fast": -10}}, "fast = -10 is not left of slow = -20"),
+    ({"detector.uio.1.poles": "fast"}, "expected a list of poles"),
+    ({"detector.uio.1.poles": [-20, -20, -20, -20, -20, -20]}, "6 poles, 5 can be chosen"),
     ({"detector.uio.0.faults": []}, "an observer that looks for no fault raises no alarm"),
     ({"detector.uio.0.faults": ["steering"]}, "'steering' is not one of actuator1"),
     ({"detector.uio.0.outputs": ["deflection1_m", "tyre1_m", "wheel1_mps"], "detector.uio.0.faults": ["body1_sensor"]}, "the fault of a sensor that this observer does not read"),
-    ({"detector.uio.0.form": "euler"}, "'euler' is not one of discrete, first-order hold"),
+    ({"detector.uio.0.form": "euler"}, "'euler' is not one of discrete, first-order hold, direct"),
+    ({"detector.uio.0.poles": [-1]}, "states that sensors tell directly need no observer, which alone has poles"),
+    ({"detector.uio": [{"faults": ["actuator1"], "form": "direct", "outputs": ["deflection1_m", "tyre1_m", "wheel1_mps"]}]}, 'form = "direct": .* do not tell every one of .*, body1_mps,'),
+    ({"detector.uio": [{"faults": ["actuator1", "body1_sensor"], "form": "direct"}]}, "do not tell every one of .*, fault of body1_mps directly"),
     ({"detector.uio.0.trust": {"deflection": 1}}, "nothing for 'body1_mps'"),
     ({"detector.uio.0.trust": [0, 1, 1, 1]}, r"trust\[0\]: 0 is outside"),
     ({"detector.uio.0.low_pass_s": -1}, r"low_pass_s: -1 is outside"),
@@ -248,13 +251,11 @@ def test_wrong_models_are_refused_in_one_line(overrides: dict[str, Any], said: s
 
 
 def test_gains_that_do_not_go_together() -> None:
-    gains = {"F": np.eye(4).tolist(), "K": np.zeros((4, 4)).tolist(), "H": np.zeros((4, 4)).tolist()}
-    for more, said in (
-        ({}, "chosen gains have poles of their own"),
-        ({"detector.uio.0.form": "first-order hold"}, "chosen gains have poles of their own"),
-    ):
-        with pytest.raises(InputError, match=said):
-            load_model("suspension", {"detector.uio.0.gains": gains} | more)
+    gains = {"F": np.eye(5).tolist(), "K": np.zeros((5, 4)).tolist(), "H": np.zeros((5, 4)).tolist()}
+    with pytest.raises(InputError, match="chosen gains have poles of their own"):
+        load_model("suspension", {"detector.uio.1.gains": gains})
+    with pytest.raises(InputError, match="chosen gains are those of continuous time"):
+        load_model("suspension", {"detector.uio": [{"faults": ["actuator1", "body1_sensor"], "form": "direct", "gains": gains}]})
     with pytest.raises(InputError, match="F has a pole at 1: its observer does not forget"):
         Models().design({"detector.uio.0.gains.F": np.eye(5).tolist()}, "default", "suspension_published")
 
