@@ -101,7 +101,7 @@ def discretised(made: Observer, sample_time_s: float, P: Array | None = None) ->
 
 
 def measured(plant: Unknown, sample_time_s: float) -> Discrete:
-    """xhat = C^-1 y, of sensors that tell every state."""
+    """Of sensors that tell every state: xhat = C^-1 y."""
     n, p = len(plant.A), plant.B.shape[1]
     if rank_of(plant.C) < n:
         raise InputError(f"{', '.join(plant.outputs)} do not tell every one of {', '.join(plant.states)} directly; add sensors, or choose another form")
