@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg
-from host_support import SEED
+from host_support import SEED, Cli
 from hullguard.design import uio_sensors
 from hullguard.design.design import design
 from hullguard.design.uio import Unknown, augment, explain, free_poles, gains, invariant_zeros, observable_part, observer, obstacle
@@ -16,7 +18,7 @@ from hullguard.design.uio_sensors import without_feedthrough
 from hullguard.errors import InputError
 from hullguard.model import load_model
 from hullguard.model.table import Array
-from uio_support import C_PRINTED, PRINTED, driven, known, published, quarter_car, rough, sensors
+from uio_support import C_PRINTED, HALF, PRINTED, driven, known, published, quarter_car, rough, sensors
 
 FIXED = -2 * 160000.0 / 276.0  # -2 k1 / (m1 + m2), whichever mass is which
 
@@ -384,6 +386,31 @@ def test_table_of_sensor_sets() -> None:
     assert "apart" in by[1, every, ("actuator1", "road1_mps", "tyre1_sensor")]
     words = uio_sensors.component_words(model)
     assert words["tyre1"].startswith("not observable") and words["spring1"].startswith("shows as a fault of force1_n")
+
+
+def test_a_half_car_needs_the_same_of_each_corner() -> None:
+    model = load_model("suspension", HALF)
+    every = tuple(model.signals[i].name for i in model.outputs)
+    unknown = ("actuator1", "actuator2", "road1_mps", "road2_mps")
+    by = {(tuple(r["sensors"]), tuple(r["unknown"])): r["why_not"] for r in uio_sensors.as_json(model)["sensor_sets"] if r["observer"] == 1}
+    assert by[every, unknown] is None
+    for corner in (1, 2):
+        less = {n: by[tuple(x for x in every if x != f"{n}{corner}_{unit}"), unknown] for n, unit in (("deflection", "m"), ("tyre", "m"), ("wheel", "mps"), ("body", "mps"))}
+        assert less["deflection"] == f"zero at s = 0: a constant offset of deflection{corner}_m hides in the unknown actuator{corner}"
+        assert str(less["tyre"]).startswith(f"rank CG is 3, of 4 unknown inputs: the rate of no output tells road{corner}_mps")
+        assert less["wheel"] is None and less["body"] is None
+        assert uio_sensors.component_words(model)[f"tyre{corner}"].startswith("not observable")
+
+
+def test_any_set_of_sensors_can_be_asked_about(cli: Cli, tmp_path: Path) -> None:
+    accelerations = "deflection1_m,rate:body1_mps,rate:wheel1_mps"
+    done = cli("design", "suspension", "--out", tmp_path, "--sensors", accelerations, "--sensors", f"{accelerations},wheel1_mps", "--json")
+    assert done.status == 0, done.err
+    assert [r["why_not"] for r in done.json["asked"]] == ["zero at s = 0: a constant offset common to body1_mps and wheel1_mps hides in the unknown road1_mps", None]
+    assert f"sensors {accelerations.replace(',', ', ')}: no unknown-input observer: zero at s = 0" in done.err
+    for model, sensors, said in (("suspension", "speed", "'speed' is none of deflection1_m, .*rate:wheel1_mps"), ("platoon", "gap12_m", "--sensors is for kind")):
+        wrong = cli("design", model, "--out", tmp_path, "--sensors", sensors)
+        assert wrong.status == 2 and re.search(said, wrong.err) and wrong.err.count("\n") == 1
 
 
 def test_a_model_that_asks_for_the_impossible_is_refused_with_the_reason() -> None:

@@ -23,7 +23,7 @@ from hullguard.model.road import RoadSpec
 from hullguard.model.schema import Reference, Scenario
 from hullguard.model.table import Array
 from hullguard.plant.unknown import Emulated, emulate
-from uio_support import C_PRINTED, driven, known, observers, quarter_car, rough
+from uio_support import C_PRINTED, HALF, driven, known, observers, quarter_car, rough
 
 ROADS = {
     "random": RoadSpec("iso8608", roughness="A", speed_mps=20.0),
@@ -36,7 +36,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "discrete": observers("discrete"),
     "first-order hold": observers("first-order hold"),
     "slower": {"sample_time_s": 0.002},
-    "half car": {"plant.corners": 2, "plant.body_kg": 480, "plant.front_m": 1.2, "plant.rear_m": 1.4, "plant.pitch_kgm2": 800, "bus.bitrate_bps": 1_000_000, "bus.data_bitrate_bps": 5_000_000},
+    "half car": HALF,
 }
 
 

@@ -26,9 +26,8 @@ from hullguard.model.table import Table
 from hullguard.model.uio import weakened
 from hullguard.plant.road import road
 from hullguard.plant.unknown import emulate
-from uio_support import quarter_car
+from uio_support import HALF, quarter_car
 
-HALF = {"plant.corners": 2, "plant.body_kg": 480, "plant.front_m": 1.2, "plant.rear_m": 1.4, "plant.pitch_kgm2": 800, "bus.bitrate_bps": 1_000_000, "bus.data_bitrate_bps": 5_000_000}
 FULL = HALF | {"plant.corners": 4, "plant.body_kg": 960, "plant.track_m": 1.5, "plant.roll_kgm2": 400}
 
 # ---- the plant ----
@@ -147,6 +146,15 @@ def test_a_worn_damper_is_told_from_the_actuator(cli: Cli) -> None:
     found = done.json["isolation"][0]
     assert (found["cause"], found["candidates"]) == ("component", ["damper1"])
     assert found["share"]["damper1"] == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_half_car_says_which_corner(cli: Cli) -> None:
+    sets = [x for key, value in HALF.items() for x in ("--set", f"{key}={value}")]
+    done = cli("run", "suspension", *sets, "--bus", "inprocess", "--json", "--samples", 1100, "--fault", "actuator2:bias:300@1000", "--seed", SEED % 1000)
+    assert done.status == 0, done.err
+    found = done.json
+    assert found["false_alarms"] == {"provisional": 0, "confirmed": 0} and found["faults"][0]["delay"] < 100
+    assert {(i["actuator"], i["cause"]) for i in found["isolation"]} == {("actuator1", "input"), ("actuator2", "undecided")}
 
 
 def test_a_weaker_tyre_is_another_road(cli: Cli) -> None:

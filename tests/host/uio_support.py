@@ -16,6 +16,15 @@ SPRING, TYRE, DAMPER = 16000.0, 160000.0, 1650.0
 STATES = ("deflection", "body", "tyre", "wheel")
 PRINTED = {k: np.array(v, dtype=np.float64) for k, v in tomllib.loads((ROOT / "tests" / "fixtures" / "suspension" / "printed.toml").read_text(encoding="utf-8")).items()}
 C_PRINTED = PRINTED["C"][:, :4]
+HALF = {
+    "plant.corners": 2,
+    "plant.body_kg": 480,
+    "plant.front_m": 1.2,
+    "plant.rear_m": 1.4,
+    "plant.pitch_kgm2": 800,
+    "bus.bitrate_bps": 1_000_000,
+    "bus.data_bitrate_bps": 5_000_000,
+}
 
 
 def observers(form: str) -> dict[str, Any]:
