@@ -112,6 +112,7 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--fresh", action="store_true", help="search again even if NAME.design.toml fits the model")
 
     p.add_argument("--isolability", action="store_true", help="which faults can be told apart, also for a model without banks for isolation; a minute for many faults")
+    p.add_argument("--sensors", metavar="NAME,..", action="append", default=[], help="would an unknown-input observer do with these outputs, or rate:STATE for an accelerometer?")
 
     p = add("run", "run a model: emulated plant, triggers, bus, detector node")
     _common(p)

@@ -166,6 +166,7 @@ def run_design(args: argparse.Namespace) -> int:
 
     overrides = dict(parse_override(text) for text in args.set)
     model = load_model(args.model, overrides)
+    asked = [uio_sensors.asked(model, text.split(",")) for text in args.sensors]
     with progress(args, f"designing {model.name}") as tick:
         stored, own = stored_for(model, args.fresh, tick, os.cpu_count() or 1)
     made = finish(model, stored)
@@ -191,6 +192,8 @@ def run_design(args: argparse.Namespace) -> int:
     for i, u in enumerate(made.uios):
         radii = ", ".join(f"{name} {r:.3g}" for name, r in zip(u.names, u.tables.steady, strict=True))
         say(args, f"  unknown-input observer {i + 1}: radii {radii}")
+    for s in asked:
+        say(args, f"  sensors {', '.join(s.outputs)}: " + (f"an observer with {s.free} free poles" if s.why_not is None else f"no unknown-input observer: {s.why_not}"))
     for f in bank_facts(made):
         found = ", ".join(f"{made.model.faults[i].name} {v:.3g}" for i, v in zip(f.faults, f.smallest[:, 0], strict=True))
         say(args, f"  {f.name}: {f.table.certificates} certificates over {f.table.window} samples, smallest fault within {f.within[0]} samples: {found}")
@@ -201,7 +204,7 @@ def run_design(args: argparse.Namespace) -> int:
         "slews": {s.name: stored.slew[i].tolist() for i, s in enumerate(model.signals)},
         "state_range": stored.state_range.tolist(),
         "checks": [{"name": c.name, "value": c.value, "limit": c.limit, "passed": c.passed} for c in made.checks],
-        "load_bound": made.load_bound, "reused": own, "fixed_point": fixed_point(made), **as_json(made, pairs), **uio_sensors.as_json(model),
+        "load_bound": made.load_bound, "reused": own, "fixed_point": fixed_point(made), **as_json(made, pairs), **uio_sensors.as_json(model, asked),
     })  # fmt: skip
     return 0
 

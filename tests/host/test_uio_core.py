@@ -7,11 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import quarter_car as car
-from host_support import SEED
+from host_support import SEED, Models
 from hullguard.core.library import library
-from hullguard.core.native_uio import CAUSES, IsolateTable, Uio
+from hullguard.core.native_uio import CAUSES, IsolateTable, Uio, UioTable
+from hullguard.design.design import Design
+from hullguard.design.uio_generator import uio_table
+from hullguard.design.uio_isolate import isolations
 from hullguard.errors import InputError
 from hullguard.model.table import Array
+from uio_support import observers
 
 MS = 1e-3
 LOW = MS / (0.1 + MS)  # 100 ms
@@ -33,6 +37,7 @@ def smooth() -> car.Drive:
 
 @pytest.mark.parametrize("real", ["f32", "f64"])
 def test_estimates_from_the_right_start(smooth: car.Drive, real: str) -> None:
+    """Acceptance (d)."""
     e = Uio(library(real), car.table(MS, 1.0)).run(smooth.y)
     rms = np.sqrt(np.mean((e.estimate[1:, [0, 2]] - np.column_stack([smooth.force, smooth.speed])[:-1]) ** 2, axis=0))
     assert e.refused == 0
@@ -41,10 +46,45 @@ def test_estimates_from_the_right_start(smooth: car.Drive, real: str) -> None:
 
 
 def test_float32_is_enough(smooth: car.Drive) -> None:
+    """Acceptance (e)."""
     single, double = (Uio(library(real), car.table(MS, 1.0)).run(smooth.y).estimate for real in ("f32", "f64"))
     off = np.abs(single - double).max(0)
     assert off[0] <= 0.15
     assert off[3:].max() <= 1e-6
+
+
+DESIGNED = {"as shipped": {}, "discrete": observers("discrete"), "first-order hold": observers("first-order hold")}
+
+
+@pytest.fixture(scope="module", params=sorted(DESIGNED))
+def designed(request: pytest.FixtureRequest, models: Models) -> Design:
+    return models.design(DESIGNED[request.param] | {"detector.uio.0.isolate": {"excitation": 8.0}}, "default", "suspension")
+
+
+@pytest.mark.parametrize(
+    ("course", "cause", "candidates", "share", "off"),
+    [
+        ({}, "input", 0, None, None),
+        ({"force": 200.0}, "actuator", 1, 0, (195.0, 206.0)),
+        ({"spring": 0.8 * car.SPRING}, "component", 2, 1, (0.2 * 0.99, 0.2 * 1.01)),
+        ({"damper": 0.5 * car.DAMPER}, "component", 4, 2, (0.5 * 0.99, 0.5 * 1.01)),
+    ],
+)
+def test_designed_tables_tell_each_cause(designed: Design, course: dict[str, float], cause: str, candidates: int, share: int | None, off: tuple[float, float] | None) -> None:
+    """Acceptance (h) of what `design` makes of a model: J_f = 12 N on the estimate alone, no radius; every reading is known."""
+    random, u = np.random.default_rng(SEED), designed.uios[0]
+    d = car.simulate(16.0, 6.0, course.get("force", 0.0), (6.0, 0.0), {k: v for k, v in course.items() if k != "force"}, 0.3 * random.standard_normal(160000))
+    value = np.zeros((len(d.x), len(designed.model.signals)))
+    value[:, designed.model.outputs] = (d.x[:, :4] + random.standard_normal((len(d.x), 4)) * [1e-4, 1e-3, 1e-4, 1e-3]) @ designed.model.plant.C.T
+    t = uio_table(u)
+    bare = UioTable(t.actuators, t.sensors, t.unknown, t.states, t.signal, t.state, t.input, t.output, t.direct)
+    isolation = replace(isolations(designed.model, u)[0].table, limit=12.0, settle=2000, release=2000)
+    uio = Uio(library("f32"), bare, isolation, width=value.shape[1])
+    run = uio.run(value)
+    assert np.abs(run.estimate[3000:6000, 0]).max() < 12.0
+    assert CAUSES[run.cause[-1]] == cause and run.candidates[-1] == candidates
+    if share is not None and off is not None:
+        assert off[0] <= uio.share[share] <= off[1]
 
 
 def noisy(random: np.random.Generator, force: float = 0.0, f0: float = 0.0, moving: float = 1.0, **broken: float) -> Array:
@@ -69,6 +109,7 @@ def noisy(random: np.random.Generator, force: float = 0.0, f0: float = 0.0, movi
 )
 @pytest.mark.parametrize("real", ["f32", "f64"])
 def test_each_cause_is_told(real: str, course: dict[str, float], cause: str, candidates: int, share: int | None, off: tuple[float, float] | None) -> None:
+    """Acceptance (h), by tables made by hand."""
     y = noisy(np.random.default_rng(SEED), **course)
     uio = Uio(library(real), car.table(MS, LOW, TRIP), ISOLATE)
     run = uio.run(y)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg
-from host_support import SEED
+from host_support import SEED, Cli
 from hullguard.design import uio_sensors
 from hullguard.design.design import design
 from hullguard.design.uio import Unknown, augment, explain, free_poles, gains, invariant_zeros, observable_part, observer, obstacle
-from hullguard.design.uio_discrete import between_samples, check_euler, discretised, estimator, first_order_hold, left_inverse, sampled
+from hullguard.design.uio_discrete import between_samples, check_euler, discretised, estimator, first_order_hold, left_inverse, measured, sampled
 from hullguard.design.uio_sensors import without_feedthrough
 from hullguard.errors import InputError
 from hullguard.model import load_model
 from hullguard.model.table import Array
-from uio_support import C_PRINTED, PRINTED, driven, known, published, quarter_car, rough, sensors
+from uio_support import C_PRINTED, HALF, PRINTED, driven, known, published, quarter_car, rough, sensors
 
 FIXED = -2 * 160000.0 / 276.0  # -2 k1 / (m1 + m2), whichever mass is which
 
@@ -30,6 +32,7 @@ def off(found: Array, printed: Array) -> float:
 
 
 def test_plant_H_and_T_are_as_printed() -> None:
+    """Acceptance (a): H and T."""
     A, B, _ = quarter_car(240.0, 36.0)
     made = gains(published(), PRINTED["K1"])
     assert off(A, PRINTED["A"][:4, :4]) < 1e-4
@@ -38,12 +41,14 @@ def test_plant_H_and_T_are_as_printed() -> None:
 
 
 def test_F_K2_and_K_follow_from_the_printed_K1_with_the_true_A1() -> None:
+    """Acceptance (a): F and K."""
     made = gains(published(), PRINTED["K1"])
     for name, found in (("F", made.F), ("K2", made.K2), ("K", made.K)):
         assert off(found, PRINTED[name]) < 1e-3, name
 
 
 def test_the_printed_A1_is_the_formula_without_a_transpose() -> None:
+    """Acceptance (a): the erratum."""
     p = published()
     CG = p.C @ p.G
     without = p.A - p.G @ np.linalg.inv(CG.T @ CG) @ CG @ p.C @ p.A
@@ -63,6 +68,7 @@ def test_poles_of_the_printed_observer_are_not_the_requested_ones() -> None:
 
 
 def test_printed_gains_by_forward_euler_at_one_kilohertz_are_refused() -> None:
+    """Acceptance (g)."""
     with pytest.raises(InputError, match=r"forward Euler with 0\.001 s grows by .* sample every 0\.000581 s or faster, or use the first-order hold"):
         check_euler(PRINTED["F"], 1e-3, "printed")
     check_euler(PRINTED["F"], 5.8e-4, "printed")
@@ -80,6 +86,7 @@ def test_first_order_hold_of_the_printed_gains_is_stable_at_any_sample_time() ->
 
 
 def test_the_road_is_known_after_four_seconds_with_the_printed_matrices() -> None:
+    """Acceptance (f)."""
     plant, p = quarter_car(240.0, 36.0), published()
     printed = replace(gains(p, PRINTED["K1"]), **{name: PRINTED[name] for name in ("H", "T", "F", "K")})
     t, x = driven(plant, 1e-3, 4.5, road=lambda t: 0.02 * 2 * np.pi * np.cos(2 * np.pi * t))
@@ -102,6 +109,7 @@ def test_the_road_is_known_after_four_seconds_with_the_printed_matrices() -> Non
 
 @pytest.mark.parametrize(("wheel", "body"), [(36.0, 240.0), (240.0, 36.0)])
 def test_poles_are_the_fixed_ones_and_the_chosen_ones(wheel: float, body: float) -> None:
+    """Acceptance (b) and (c)."""
     p = augment(known(C_PRINTED, wheel, body), [2], [0.0])
     assert free_poles(p) == 3
     made = observer(p, [-10.0, -20.0, -25.0])
@@ -250,6 +258,7 @@ def run(p: Unknown, poles: list[complex], period_s: float, seconds: float, direc
 
 @pytest.mark.parametrize("direct", [False, True])
 def test_reconstruction_at_one_kilohertz(direct: bool) -> None:
+    """Acceptance (d)."""
     force, road = run(known(C_PRINTED), [-10, -20, -20], 1e-3, 20.0, direct)
     assert np.sqrt(np.mean(force**2)) <= 2.0 and np.sqrt(np.mean(road**2)) <= 3e-3
 
@@ -283,6 +292,26 @@ def test_the_estimator_is_the_recursion(period_s: float, direct: bool) -> None:
         assert np.allclose(estimate, [low_f[0], low_0, low_f[1], *x[:4]], rtol=1e-7, atol=1e-7 * np.abs(low_f).max())
         if k + 1 < 50:
             z = d.Fd @ z + d.K0 @ y[k] + d.K1d @ y[k + 1] + d.Bz @ u[k]
+
+
+def test_sensors_that_tell_every_state_are_an_observer() -> None:
+    """C^-1 y, mixed rows of the states and in other units, with the low pass: what moves the state beyond the model, and nothing is remembered but that."""
+    rng = np.random.default_rng(SEED)
+    for _ in range(20):
+        period_s, tau, C = float(rng.choice([1e-3, 1e-2])), float(rng.choice([0.0, 0.2])), rng.standard_normal((4, 4)) + 3.0 * np.eye(4)
+        p = known(C)
+        d = measured(p, period_s)
+        e, a = estimator(d, 4, [0], [], [1], tau), period_s / (tau + period_s)
+        assert len(e.state) == 2 and obstacle(p) is None
+        Ad, BG = sampled(p, period_s).A, np.hstack([sampled(p, period_s).B, sampled(p, period_s).G])
+        x, s, low = rng.standard_normal(4), np.zeros(2), np.zeros(2)
+        before = a * (d.P @ x)  # what a start out of nothing seems to have moved
+        for _ in range(60):
+            u, f = rng.standard_normal(1), rng.standard_normal(2)
+            v = np.concatenate([C @ x, u])
+            estimate, s = e.output @ s + e.direct @ v, e.state @ s + e.input @ v
+            assert np.allclose(estimate, [*(low + before), *x], rtol=1e-6, atol=1e-6 * np.abs(before).max())
+            x, low, before = Ad @ x + BG @ np.concatenate([u, f]), low + a * (f - low), (1 - a) * before
 
 
 def test_what_lies_between_samples_is_bounded() -> None:
@@ -357,6 +386,31 @@ def test_table_of_sensor_sets() -> None:
     assert "apart" in by[1, every, ("actuator1", "road1_mps", "tyre1_sensor")]
     words = uio_sensors.component_words(model)
     assert words["tyre1"].startswith("not observable") and words["spring1"].startswith("shows as a fault of force1_n")
+
+
+def test_a_half_car_needs_the_same_of_each_corner() -> None:
+    model = load_model("suspension", HALF)
+    every = tuple(model.signals[i].name for i in model.outputs)
+    unknown = ("actuator1", "actuator2", "road1_mps", "road2_mps")
+    by = {(tuple(r["sensors"]), tuple(r["unknown"])): r["why_not"] for r in uio_sensors.as_json(model)["sensor_sets"] if r["observer"] == 1}
+    assert by[every, unknown] is None
+    for corner in (1, 2):
+        less = {n: by[tuple(x for x in every if x != f"{n}{corner}_{unit}"), unknown] for n, unit in (("deflection", "m"), ("tyre", "m"), ("wheel", "mps"), ("body", "mps"))}
+        assert less["deflection"] == f"zero at s = 0: a constant offset of deflection{corner}_m hides in the unknown actuator{corner}"
+        assert str(less["tyre"]).startswith(f"rank CG is 3, of 4 unknown inputs: the rate of no output tells road{corner}_mps")
+        assert less["wheel"] is None and less["body"] is None
+        assert uio_sensors.component_words(model)[f"tyre{corner}"].startswith("not observable")
+
+
+def test_any_set_of_sensors_can_be_asked_about(cli: Cli, tmp_path: Path) -> None:
+    accelerations = "deflection1_m,rate:body1_mps,rate:wheel1_mps"
+    done = cli("design", "suspension", "--out", tmp_path, "--sensors", accelerations, "--sensors", f"{accelerations},wheel1_mps", "--json")
+    assert done.status == 0, done.err
+    assert [r["why_not"] for r in done.json["asked"]] == ["zero at s = 0: a constant offset common to body1_mps and wheel1_mps hides in the unknown road1_mps", None]
+    assert f"sensors {accelerations.replace(',', ', ')}: no unknown-input observer: zero at s = 0" in done.err
+    for model, sensors, said in (("suspension", "speed", "'speed' is none of deflection1_m, .*rate:wheel1_mps"), ("platoon", "gap12_m", "--sensors is for kind")):
+        wrong = cli("design", model, "--out", tmp_path, "--sensors", sensors)
+        assert wrong.status == 2 and re.search(said, wrong.err) and wrong.err.count("\n") == 1
 
 
 def test_a_model_that_asks_for_the_impossible_is_refused_with_the_reason() -> None:

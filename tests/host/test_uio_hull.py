@@ -23,7 +23,7 @@ from hullguard.model.road import RoadSpec
 from hullguard.model.schema import Reference, Scenario
 from hullguard.model.table import Array
 from hullguard.plant.unknown import Emulated, emulate
-from uio_support import C_PRINTED, driven, known, quarter_car, rough
+from uio_support import C_PRINTED, HALF, driven, known, observers, quarter_car, rough
 
 ROADS = {
     "random": RoadSpec("iso8608", roughness="A", speed_mps=20.0),
@@ -33,9 +33,10 @@ ROADS = {
 }
 VARIANTS: dict[str, dict[str, Any]] = {
     "shipped": {},
-    "first-order hold": {"detector.uio.0.form": "first-order hold", "detector.uio.1.form": "first-order hold"},
+    "discrete": observers("discrete"),
+    "first-order hold": observers("first-order hold"),
     "slower": {"sample_time_s": 0.002},
-    "half car": {"plant.corners": 2, "plant.body_kg": 480, "plant.front_m": 1.2, "plant.rear_m": 1.4, "plant.pitch_kgm2": 800, "bus.bitrate_bps": 1_000_000, "bus.data_bitrate_bps": 5_000_000},
+    "half car": HALF,
 }
 
 
@@ -50,7 +51,8 @@ def truths(made: Design, u: UioDesign, run: Emulated) -> Array:
     q, p = len(made.model.plant.unknown.names), len(u.faults)  # type: ignore[union-attr]
     moved = run.state[1:] - run.state[:-1] @ model.plant.A.T - run.readings[:-1, model.inputs] @ model.plant.B.T
     a = model.sample_time_s / (u.spec.low_pass_s + model.sample_time_s)
-    rows = u.linear.output[p : p + q, :n] / a  # P, as far as it multiplies the plant's own states
+    first = 0 if u.spec.form == "direct" else n + len(u.spec.sensors)
+    rows = -u.follows[first + len(u.spec.actuators) :][:q] / a  # P, as far as it multiplies the plant's own states
     out = np.zeros((len(run.state), len(u.names)))
     for k in range(1, len(run.state)):
         out[k, p : p + q] = out[k - 1, p : p + q] + a * (rows @ moved[k - 1] - out[k - 1, p : p + q])
@@ -130,7 +132,7 @@ def noise_share(made: Design, u: UioDesign, i: int) -> float:
 
 def test_the_bound_on_unknown_inputs_is_needed(models: Models) -> None:
     """Without what the hold lets through, a rough road at coarse samples leaves the radius: the check above can fail."""
-    coarse = {"sample_time_s": 0.01, "detector.uio.0.form": "first-order hold", "detector.uio.1.form": "first-order hold", "plant.unknown.road.rate": 300.0}
+    coarse = {"sample_time_s": 0.01, "plant.unknown.road.rate": 300.0} | observers("first-order hold")
     made = models.design(coarse, "default", "suspension")
     run = course(made, RoadSpec("sine", 0.01, 18.0), 400, 1, "rest")
     u = made.uios[0]
@@ -158,7 +160,7 @@ def test_modes_that_cannot_be_told_apart_are_refused() -> None:
     with pytest.raises(InputError, match="here: poles so close to one another, or to the low pass"):
         uio_hull._modes(Linear(np.array([[0.9, 1.0], [0.0, 0.9]]), two, two.T, one), "here")
     with pytest.raises(InputError, match="too slow for a threshold"):
-        Models().design({"detector.uio.0.poles": [-0.001, -20, -80, -160]}, "default", "suspension")
+        Models().design({"detector.uio.1.poles": [-0.001, -20, -40, -80, -160]}, "default", "suspension")
 
 
 def test_the_left_inverse_is_the_best_one(models: Models) -> None:
@@ -187,6 +189,7 @@ def published_estimates(real: str, moved: dict[str, Any]) -> tuple[Array, Array]
 
 
 def test_reconstruction_in_both_number_types() -> None:
+    """Acceptance (d) and (e), by the tables that the design makes."""
     moved: dict[str, Any] = {}
     double, truth = published_estimates("f64", moved)
     single, _ = published_estimates("f32", moved)

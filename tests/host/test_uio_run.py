@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -25,9 +26,8 @@ from hullguard.model.table import Table
 from hullguard.model.uio import weakened
 from hullguard.plant.road import road
 from hullguard.plant.unknown import emulate
-from uio_support import quarter_car
+from uio_support import HALF, quarter_car
 
-HALF = {"plant.corners": 2, "plant.body_kg": 480, "plant.front_m": 1.2, "plant.rear_m": 1.4, "plant.pitch_kgm2": 800, "bus.bitrate_bps": 1_000_000, "bus.data_bitrate_bps": 5_000_000}
 FULL = HALF | {"plant.corners": 4, "plant.body_kg": 960, "plant.track_m": 1.5, "plant.roll_kgm2": 400}
 
 # ---- the plant ----
@@ -114,6 +114,31 @@ def test_an_actuator_that_pushes_is_found(cli: Cli, tmp_path: Path) -> None:
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     for name in ("estimates-states", "estimates-unknown", "estimates-errors", "estimates-faults"):
         assert name in page
+    again = cli("replay", "suspension", "--csv", tmp_path / "run" / "signals.csv", "--bus", "inprocess", "--json")
+    assert again.status == 0, again.err
+    alarms = [v["k"] for v in again.json["verdicts"] if v["plant"] == "confirmed"]
+    assert len(alarms) == 1 and 1000 < alarms[0] < 1200, "the recording has the fault in it; what starts in a moving plant finds it a little later"
+    assert {(e["observer"], e["name"]) for e in again.json["estimates"]} == set(rows) and "error_max" not in again.json["estimates"][0]
+
+
+def test_damaged_frames_accuse_no_suspension(cli: Cli) -> None:
+    """Every action of the injector, at both senders: the node's counters are the ledger's."""
+    done = cli("campaign", "suspension", "--inject", "all", "--runs", 1, "--samples", 120, "--no-fault", "--workers", 1, "--seed", SEED % 1000, "--json", "-q")
+    assert done.status == 0, done.err
+    assert not done.json["failures"] and all(r["equal"] for r in done.json["rows"]) and done.json["injected"] > 1000
+    assert all(r["confirmed"] == 0 for r in done.json["rows"] if r["class"] == "seen")
+
+
+def test_a_monitor_says_what_the_node_says(cli: Cli, tmp_path: Path) -> None:
+    assert cli("run", "suspension", "--bus", "inprocess", "--quiet", "--samples", 300, "--fault", "actuator1:bias:600@200", "--out", tmp_path).status == 0
+    verdicts = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["verdicts"]
+    done = cli("monitor", "suspension", "--log", tmp_path / "run.log", "--rest", "--json")
+    assert done.status == 0, done.err
+    lines = [json.loads(line) for line in done.out.splitlines()]
+    for who in ("monitor", "ecu"):
+        said = [(x[who]["k"] if who == "monitor" else x[who]["verdict"]["k"]) for x in lines if x["event"] == who]
+        assert said == [v["k"] for v in verdicts]
+    assert lines[-1]["monitor"]["plant"] == "confirmed" == verdicts[-1]["plant"] and lines[-1]["samples"] == 300
 
 
 def test_a_worn_damper_is_told_from_the_actuator(cli: Cli) -> None:
@@ -121,6 +146,15 @@ def test_a_worn_damper_is_told_from_the_actuator(cli: Cli) -> None:
     found = done.json["isolation"][0]
     assert (found["cause"], found["candidates"]) == ("component", ["damper1"])
     assert found["share"]["damper1"] == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_half_car_says_which_corner(cli: Cli) -> None:
+    sets = [x for key, value in HALF.items() for x in ("--set", f"{key}={value}")]
+    done = cli("run", "suspension", *sets, "--bus", "inprocess", "--json", "--samples", 1100, "--fault", "actuator2:bias:300@1000", "--seed", SEED % 1000)
+    assert done.status == 0, done.err
+    found = done.json
+    assert found["false_alarms"] == {"provisional": 0, "confirmed": 0} and found["faults"][0]["delay"] < 100
+    assert {(i["actuator"], i["cause"]) for i in found["isolation"]} == {("actuator1", "input"), ("actuator2", "undecided")}
 
 
 def test_a_weaker_tyre_is_another_road(cli: Cli) -> None:
@@ -217,16 +251,19 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"detector.prediction": True}, r"detector\.prediction cannot be had"),
     ({"detector.threshold": "zonotope"}, r"detector\.threshold cannot be had"),
     ({"detector.uio": []}, "0 observers; 1 .. 32 are possible"),
-    ({"detector.uio.0.poles": [-1, 2, -3, -4]}, r"poles: 2 does not die out"),
-    ({"detector.uio.0.poles": [[-1, 2], -3, -4]}, "comes without its conjugate"),
-    ({"detector.uio.0.poles": [-1, -2]}, "2 poles, 4 can be chosen; none is fixed"),
-    ({"detector.uio.0.poles": {"slow": -20, "fast": -10}}, "fast = -10 is not left of slow = -20"),
-    ({"detector.uio.0.poles": "fast"}, "expected a list of poles"),
-    ({"detector.uio.0.poles": [-20, -20, -20, -20, -20]}, "5 poles, 4 can be chosen"),
+    ({"detector.uio.1.poles": [-1, 2, -3, -4]}, r"poles: 2 does not die out"),
+    ({"detector.uio.1.poles": [[-1, 2], -3, -4]}, "comes without its conjugate"),
+    ({"detector.uio.1.poles": [-1, -2]}, "2 poles, 5 can be chosen; none is fixed"),
+    ({"detector.uio.1.poles": {"slow": -20, "fast": -10}}, "fast = -10 is not left of slow = -20"),
+    ({"detector.uio.1.poles": "fast"}, "expected a list of poles"),
+    ({"detector.uio.1.poles": [-20, -20, -20, -20, -20, -20]}, "6 poles, 5 can be chosen"),
     ({"detector.uio.0.faults": []}, "an observer that looks for no fault raises no alarm"),
     ({"detector.uio.0.faults": ["steering"]}, "'steering' is not one of actuator1"),
     ({"detector.uio.0.outputs": ["deflection1_m", "tyre1_m", "wheel1_mps"], "detector.uio.0.faults": ["body1_sensor"]}, "the fault of a sensor that this observer does not read"),
-    ({"detector.uio.0.form": "euler"}, "'euler' is not one of discrete, first-order hold"),
+    ({"detector.uio.0.form": "euler"}, "'euler' is not one of discrete, first-order hold, direct"),
+    ({"detector.uio.0.poles": [-1]}, "states that sensors tell directly need no observer, which alone has poles"),
+    ({"detector.uio": [{"faults": ["actuator1"], "form": "direct", "outputs": ["deflection1_m", "tyre1_m", "wheel1_mps"]}]}, 'form = "direct": .* do not tell every one of'),
+    ({"detector.uio": [{"faults": ["actuator1", "body1_sensor"], "form": "direct"}]}, "do not tell every one of .*, fault of body1_mps directly"),
     ({"detector.uio.0.trust": {"deflection": 1}}, "nothing for 'body1_mps'"),
     ({"detector.uio.0.trust": [0, 1, 1, 1]}, r"trust\[0\]: 0 is outside"),
     ({"detector.uio.0.low_pass_s": -1}, r"low_pass_s: -1 is outside"),
@@ -248,13 +285,11 @@ def test_wrong_models_are_refused_in_one_line(overrides: dict[str, Any], said: s
 
 
 def test_gains_that_do_not_go_together() -> None:
-    gains = {"F": np.eye(4).tolist(), "K": np.zeros((4, 4)).tolist(), "H": np.zeros((4, 4)).tolist()}
-    for more, said in (
-        ({}, "chosen gains have poles of their own"),
-        ({"detector.uio.0.form": "first-order hold"}, "chosen gains have poles of their own"),
-    ):
-        with pytest.raises(InputError, match=said):
-            load_model("suspension", {"detector.uio.0.gains": gains} | more)
+    gains = {"F": np.eye(5).tolist(), "K": np.zeros((5, 4)).tolist(), "H": np.zeros((5, 4)).tolist()}
+    with pytest.raises(InputError, match="chosen gains have poles of their own"):
+        load_model("suspension", {"detector.uio.1.gains": gains})
+    with pytest.raises(InputError, match="chosen gains are those of continuous time"):
+        load_model("suspension", {"detector.uio": [{"faults": ["actuator1", "body1_sensor"], "form": "direct", "gains": gains}]})
     with pytest.raises(InputError, match="F has a pole at 1: its observer does not forget"):
         Models().design({"detector.uio.0.gains.F": np.eye(5).tolist()}, "default", "suspension_published")
 

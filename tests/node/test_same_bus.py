@@ -42,14 +42,17 @@ class Case:
         return self.scenario != "adaptive"
 
     def arguments(self, out: Path, bus: str) -> list[str]:
-        return ["run", self.model, "--scenario", self.scenario, "--real", self.real, "--seed", str(SEED), "--bus", bus, "--out", str(out / self.name), "--json"]
+        more = SHORT if self.model == "suspension" else []
+        return ["run", self.model, "--scenario", self.scenario, "--real", self.real, "--seed", str(SEED), "--bus", bus, "--out", str(out / self.name), "--json", *more]
 
 
+SHORT = ["--samples", "280", "--fault", "actuator1:bias:-600@200"]  # of 9 000 samples at 1 kHz
+SUSPENSION = Case("suspension", "default", "f32")  # its readings come from a road, which the oracle does not drive on
 EVERY = [("platoon", "default"), ("platoon", "rest"), ("platoon", "manoeuvres"), ("platoon", "adaptive"), ("openacc", "default")]
 SINGLE = [Case(m, s, "f32") for m, s in EVERY]
 DOUBLE = [Case(m, s, "f64") for m, s in EVERY]
-ON_VCAN = [*SINGLE, Case("platoon", "default", "f64"), Case("openacc", "default", "f64")]
-HERE_AND_NOW = [*SINGLE, *DOUBLE]
+ON_VCAN = [*SINGLE, Case("platoon", "default", "f64"), Case("openacc", "default", "f64"), SUSPENSION]
+HERE_AND_NOW = [*SINGLE, *DOUBLE, SUSPENSION]
 BUS_STATES = ("absent", "good", "lossy", "stale")
 PLANTS = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
 
@@ -123,7 +126,7 @@ def test_same_seed_same_verdicts(case: Case, in_process: dict[Case, Ended], on_v
 def test_same_seed_same_frames(case: Case, in_process: dict[Case, Ended], on_vcan: dict[Case, Ended]) -> None:
     inside, outside = on_vcan[case], in_process[case]
     assert inside.log() == outside.log()
-    for name in ("signals.csv", "labels.csv"):
+    for name in ("signals.csv", "labels.csv", *(["estimates.csv"] if case is SUSPENSION else [])):
         assert (inside.files / name).read_bytes() == (outside.files / name).read_bytes(), name
     times = [e.time_s for e in candump.read(inside.files / "run.log")]
     assert times == sorted(times), "a log has one clock"
@@ -144,6 +147,12 @@ def test_no_false_alarm(case: Case, on_vcan: dict[Case, Ended]) -> None:
     result = on_vcan[case].result
     assert result["false_alarms"] == {"provisional": 0, "confirmed": 0}
     assert result["margin_max"] <= 1.0
+
+
+def test_a_fault_of_the_suspension_is_found_on_the_bus(on_vcan: dict[Case, Ended]) -> None:
+    found = on_vcan[SUSPENSION].result
+    assert found["faults"][0]["detected_at"] is not None and found["faults"][0]["delay"] <= 80
+    assert found["verdicts"][-1]["plant"] == "confirmed" and found["frames"]["measurement"] < 0.6 * found["samples"]
 
 
 # ---- the oracle ----

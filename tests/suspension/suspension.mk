@@ -1,4 +1,4 @@
-# The shipped suspension on random roads. `make test` drives a few seconds, `make suspension-study` 10 000 at each sample rate, which takes half an hour.
+# The shipped suspension on random roads. `make test` drives a few seconds, `make suspension-study` 10 000 at each sample rate, which takes some ten minutes.
 
 .PHONY: suspension-study suspension-short
 suspension-study: lib ## 10 000 s of roads: false alarms, frames, delays, parts named

@@ -19,7 +19,8 @@
  *
  *  (N is made offline, where its difference of nearly equal numbers costs no digits). The fault of a sensor is a state, whose estimate goes through a
  *  low pass too: p(k+1) = (1-a) p(k) + a xhat_i(k). All this is run by what runs every other linear system here: residual.h with estimates in the place
- *  of residuals, hull.h for the radii. Any other linear observer fits as well: exact in discrete time, of a reduced order, with inputs that act on z.
+ *  of residuals, hull.h for the radii. Any other linear observer fits as well: exact in discrete time, of a reduced order, with inputs that act on z;
+ *  or, where outputs tell every state, xhat = C^-1 y itself (H = C^-1, T = 0, no s): it waits for nothing, so that an error counts in its own sample only.
  *
  *  **What a radius bounds**, |estimate - truth| <= radius in every sample:
  *  - of a state: truth is x_i(k);

@@ -9,6 +9,9 @@ u is held between samples by the actuator. As a linear system from signals to es
     g(k+1) = (1-a) g(k) + N xhat(k) - a P Bd u(k)             fhat(k) = g(k) + a P xhat(k)    N = a P ((1-a) I - Ad)
     l(k+1) = (1-a) (l(k) + a x0hat(k))                        low-passed fault of a sensor, l(k) + a x0hat(k)
 
+Where the outputs tell every state, xhat(k) = C^-1 y(k) is an observer too, H = C^-1 with T = 0: it waits for nothing, so that an error of a signal
+counts in its own sample and not as long as a pole remembers it. s stays 0 and is left out.
+
 Without a fault s = Ts x, g = t - a P x and l = 0 but for what is bounded here, t the low-passed mean of an unknown input over its intervals.
 """
 
@@ -20,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from hullguard.design.uio import Observer, Unknown
+from hullguard.design.uio import Observer, Unknown, rank_of
 from hullguard.errors import InputError
 from hullguard.model.table import Array
 
@@ -97,6 +100,15 @@ def discretised(made: Observer, sample_time_s: float, P: Array | None = None) ->
     return Discrete(plant, sample_time_s, Fd, K0, K1d, Bz, made.H, made.T, Ad, Bd, Gd, left_inverse(Gd) if P is None else P)
 
 
+def measured(plant: Unknown, sample_time_s: float) -> Discrete:
+    """Of sensors that tell every state: xhat = C^-1 y."""
+    n, p = len(plant.A), plant.B.shape[1]
+    if rank_of(plant.C) < n:
+        raise InputError(f"{', '.join(plant.outputs)} do not tell every one of {', '.join(plant.states)} directly; add sensors, or choose another form")
+    at, none, H = sampled(plant, sample_time_s), np.zeros((n, n)), np.asarray(np.linalg.pinv(plant.C))
+    return Discrete(plant, sample_time_s, none, np.zeros_like(H), np.zeros_like(H), np.zeros((n, p)), H, none, at.A, at.B, at.G, left_inverse(at.G))
+
+
 def sampled(plant: Unknown, sample_time_s: float) -> Unknown:
     """The plant at its samples, unknown inputs held in between: what an observer designed in discrete time is made for."""
     Ad, BG = zero_order_hold(plant.A, np.hstack([plant.B, plant.G]), sample_time_s)
@@ -142,7 +154,8 @@ def estimator(d: Discrete, own: int, actuators: Sequence[int], sensors: Sequence
     exempt[n + len(actuators) : n + q] = True
     # Faults of actuators, of sensors, unknown inputs, states.
     rows = [*range(len(actuators)), *range(q, q + r), *range(len(actuators), q), *range(q + r, q + r + own)]
-    return Estimator(state, inputs, output[rows], direct[rows], follows, truth[rows], exempt)
+    kept = slice(n if not np.any(d.T) else 0, order)  # without T, s stays 0
+    return Estimator(state[kept, kept], inputs[kept], output[rows, kept], direct[rows], follows[kept], truth[rows], exempt[kept])
 
 
 def between_samples(A: Array, column: Array, follows: Array, sample_time_s: float, change: float) -> Array:

@@ -12,14 +12,14 @@ from hullguard.design.arith import digits, mul, nearest32
 from hullguard.design.checks import Check
 from hullguard.design.hull import Linear, Ranges, rounded
 from hullguard.design.observer import ObserverMatrices, SubPlant
-from hullguard.design.uio_discrete import Discrete, Estimator, between_samples, discretised, estimator, left_inverse, sampled, zero_order_hold
+from hullguard.design.uio_discrete import Discrete, Estimator, between_samples, discretised, estimator, left_inverse, measured, sampled, zero_order_hold
 from hullguard.design.uio_inverse import answers, best_rows, within_a_sample
 from hullguard.design.uio_types import StoredUio
 from hullguard.errors import InputError
 from hullguard.model.plant import Plant
 from hullguard.model.schema import Model, Observer, Search
 from hullguard.model.table import Array
-from hullguard.model.uio import DISCRETE, UioSpec, UnknownInputs
+from hullguard.model.uio import DIRECT, DISCRETE, UioSpec, UnknownInputs
 
 OBJECTIVE = "unknown inputs"  # of the observers made here: nothing is searched for
 HORIZON_S = 5.0  # over which the answer to a step of a fault is followed
@@ -99,6 +99,21 @@ def _observer(model: Model, spec: UioSpec, where: str) -> uio.Observer:
     return uio.observer(held, np.exp(_the_poles(spec, uio.free_poles(held)) * model.sample_time_s), where)  # type: ignore[arg-type]
 
 
+def _discrete(model: Model, spec: UioSpec, where: str) -> tuple[Discrete, Array]:
+    """What runs, and the poles that no gain moves."""
+    if spec.form != DIRECT:
+        made = _observer(model, spec, where)
+        return discretised(made, model.sample_time_s), made.fixed
+    plant = plant_of(model, spec)
+    reason = uio.obstacle(plant)
+    if reason is not None:
+        raise InputError(f"{where}: no unknown-input observer with {', '.join(plant.outputs)}: {reason}")
+    try:
+        return measured(plant, model.sample_time_s), np.zeros(0)
+    except InputError as error:
+        raise InputError(f'{where}: form = "direct": {error}') from error
+
+
 def _given(plant: uio.Unknown, spec: UioSpec, where: str) -> uio.Observer:
     """A chosen F, K and H. T = I - H C; how far T A - F T = K C and T G = 0 are off is bounded, not assumed."""
     assert spec.gains is not None
@@ -113,9 +128,8 @@ def find(model: Model, i: int, radius: Array, state_range: Array) -> StoredUio:
     """The observer of a specification, rounded for the design file. `radius` (signals): what radii usually are; `state_range` (n)."""
     spec, where = model.uios[i], where_of(model, i)
     refuse_others(model, where)
-    made = _observer(model, spec, where)
     n, r, q = model.plant.n, len(spec.sensors), len(spec.actuators)
-    d = discretised(made, model.sample_time_s)
+    d, fixed = _discrete(model, spec, where)
     unknown = range(q, q + len(unknown_of(model).names))
     d = replace(d, P=_left_inverse(model, spec, d, [*range(q), *unknown], radius, state_range))
     e = estimator(d, n, range(q), range(r), unknown, spec.low_pass_s)
@@ -126,7 +140,7 @@ def find(model: Model, i: int, radius: Array, state_range: Array) -> StoredUio:
         digits(e.direct),
         digits(e.follows),
         digits(_passing(model, e) * UP),
-        digits(made.fixed.real) + 1j * digits(made.fixed.imag),
+        digits(fixed.real) + 1j * digits(fixed.imag),
     )
 
 

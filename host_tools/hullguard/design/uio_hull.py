@@ -114,8 +114,9 @@ def build(lin: Linear, T: Array, truth: Array, plant: SubPlant, ranges: Ranges, 
     behind = (np.abs(out) * (decay**length / (1 - decay))) @ (np.abs(inverse) @ (loss.into_e + passing.box + row_sums(np.abs(passing.columns))))
 
     mode_input = np.abs(mul(inverse.real, lin.input) + 1j * mul(inverse.imag, lin.input)) * WIDER
-    taps = _taps(weights, np.abs(out) * WIDER, decay, mode_input, radius, least)
-    late = mul(loss.weight[taps:].sum(0), (2 * ranges.value)[:, None])[:, 0]
+    rounded_lags = mul(loss.weight.reshape(-1, len(ranges.value)), (2 * ranges.value)[:, None]).reshape(loss.weight.shape[:2])
+    taps = _taps(weights, np.abs(out) * WIDER, decay, mode_input, radius, rounded_lags, least)
+    late = rounded_lags[taps:].sum(0)
     # Of it, what is no rounding: a hold that takes y for straight between samples.
     m = plant.C.shape[0]
     off = [mul(T, plant.A) - mul(lin.state, T) - mul(lin.input[:, :m], plant.C), mul(T, plant.B) - mul(lin.input[:, :m], plant.D) - lin.input[:, m:]]
@@ -159,11 +160,19 @@ def build(lin: Linear, T: Array, truth: Array, plant: SubPlant, ranges: Ranges, 
     )
 
 
-def _taps(weights: Array, out: Array, decay: Array, into: Array, radius: Array, least: int) -> int:
-    """Fewest taps behind which the modes' bound is a small part of the radius."""
-    limit = TAIL_SHARE * (weights * radius).sum((0, 2))
-    behind = into @ radius / (1 - decay)
-    return next((t for t in range(max(least, 2), TAPS_MAX) if np.all(out * decay ** (t - 1) @ behind <= limit)), TAPS_MAX)
+def _taps(weights: Array, out: Array, decay: Array, into: Array, radius: Array, late: Array, least: int) -> int:
+    """Fewest taps with which radii are hardly larger than with TAPS_MAX: two do where each estimate has one mode, whose bound is then exact.
+
+    `late` (lags x rows): what the rounding of each lag adds if the modes bound it.
+    """
+    by_lag, behind = (weights * radius).sum(2), into @ radius / (1 - decay)
+    summed, added = np.vstack([np.zeros(len(out)), by_lag.cumsum(0)]), late[::-1].cumsum(0)[::-1]
+
+    def radii(t: int) -> Array:
+        return np.asarray(summed[min(t, len(by_lag))] + out * decay ** (t - 1) @ behind + (added[t] if t < len(added) else 0.0))
+
+    limit = radii(TAPS_MAX) + TAIL_SHARE * summed[-1]
+    return next((t for t in range(max(least, 2), TAPS_MAX) if np.all(radii(t) <= limit)), TAPS_MAX)
 
 
 def _ready(out: Array, decay: Array, start: Array, steady: Array) -> int:

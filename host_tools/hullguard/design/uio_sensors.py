@@ -54,6 +54,25 @@ def without_feedthrough(plant: uio.Unknown, E: Array) -> uio.Unknown:
     return uio.Unknown(A, plant.B, left @ plant.C, plant.G @ rest, plant.states, tuple(named), tuple(f"y without f, {i + 1}" for i in range(len(left))), plant.discrete)
 
 
+def asked(model: Model, names: Sequence[str]) -> SensorSet:
+    """Whether these sensors would do for the first observer's actuators and the unknown inputs.
+
+    Names are those of outputs; rate:STATE is what an accelerometer reads where the state is a velocity, and feels forces at once.
+    """
+    if not model.uios:
+        raise InputError(f'model {model.name}: it has no inputs that nobody knows; --sensors is for kind = "uio"')
+    spec = replace(model.uios[0], outputs=tuple(range(len(model.outputs))), sensors=(), decay=())
+    plant = plant_of(model, spec)
+    rows = {n: (plant.C[i], np.zeros(plant.G.shape[1])) for i, n in enumerate(plant.outputs)}
+    rows |= {f"rate:{n}": (plant.A[i], plant.G[i]) for i, n in enumerate(plant.states)}
+    for n in names:
+        if n not in rows:
+            raise InputError(f"--sensors: '{n}' is none of {', '.join(rows)}")
+    C, E = (np.array([rows[n][j] for n in names]) for j in (0, 1))
+    found = judged(without_feedthrough(replace(plant, C=C, outputs=tuple(names)), E))
+    return replace(found, outputs=tuple(names), unknown=plant.inputs)
+
+
 def sensor_sets(model: Model) -> list[list[SensorSet]]:
     """Of each observer: its own set, each with one sensor less, and its own with the fault of each sensor beside those that it estimates."""
     return [_around(model, spec) for spec in model.uios]
@@ -95,24 +114,23 @@ def component_words(model: Model) -> dict[str, str]:
     return said
 
 
-def as_json(model: Model) -> dict[str, Any]:
-    """What `design --json` adds for a model of kind "uio"."""
+def as_json(model: Model, more: Sequence[SensorSet] = ()) -> dict[str, Any]:
+    """What `design --json` adds for a model of kind "uio"; `more`: sets that were asked for."""
     if not model.uios:
         return {}
-    rows = [
-        {
-            "observer": i + 1,
-            "sensors": list(s.outputs),
-            "unknown": list(s.unknown),
-            "works": s.why_not is None,
-            "why_not": s.why_not,
-            "free_poles": s.free,
-            "fixed_poles": [[z.real, z.imag] for z in s.fixed],
-        }
-        for i, every in enumerate(sensor_sets(model))
-        for s in every
-    ]
-    return {"sensor_sets": rows, "components": component_words(model)}
+    rows = [{"observer": i + 1} | _facts(s) for i, every in enumerate(sensor_sets(model)) for s in every]
+    return {"sensor_sets": rows, "asked": [_facts(s) for s in more], "components": component_words(model)}
+
+
+def _facts(s: SensorSet) -> dict[str, Any]:
+    return {
+        "sensors": list(s.outputs),
+        "unknown": list(s.unknown),
+        "works": s.why_not is None,
+        "why_not": s.why_not,
+        "free_poles": s.free,
+        "fixed_poles": [[z.real, z.imag] for z in s.fixed],
+    }
 
 
 def leaky_integration_error(leak_per_s: float, height_m: float, offset_mps2: float) -> float:

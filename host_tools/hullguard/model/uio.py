@@ -5,6 +5,7 @@ road = { bound = 3.0, rate = 200.0 }  # |road| and |its change a second|, at eve
 
 [[detector.uio]]
 outputs = [..]  faults = [..]         # faults of actuators are estimated from columns of B, of sensors as states of their own
+form = "discrete"                     # or "first-order hold", or, without poles, "direct": where sensors tell every state
 poles = [-20, -40, -80, -160]         # a second; or { slow = -20, fast = -160 }
 low_pass_s = 0.1
 """
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     from hullguard.model.schema import Fault
 
 KIND = "uio"
-FORMS = ("discrete", "first-order hold")
-DISCRETE, HOLD = FORMS
+FORMS = ("discrete", "first-order hold", "direct")
+DISCRETE, HOLD, DIRECT = FORMS
 _STEM = re.compile(r"^[a-z_]*[a-z]")
 
 
@@ -147,7 +148,9 @@ def _read_uio(t: Table, states: Sequence[str], outputs: Sequence[str], faults: S
     sensors = tuple(i for i, f in named if f.type == "sensor")
     if not named:
         raise t.error("faults", "none: an observer that looks for no fault raises no alarm; name one")
-    trust, gains = _trust(t, states), _gains(t, len(states) + len(sensors), len(chosen))
+    form, trust, gains = t.text("form", DISCRETE, FORMS), _trust(t, states), _gains(t, len(states) + len(sensors), len(chosen))
+    if form == DIRECT and "poles" in t:
+        raise t.error("poles", "states that sensors tell directly need no observer, which alone has poles; remove them, or choose another form")
     if gains is not None and "poles" in t:
         raise t.error("poles", "chosen gains have poles of their own; remove one of them")
     spec = UioSpec(
@@ -155,14 +158,14 @@ def _read_uio(t: Table, states: Sequence[str], outputs: Sequence[str], faults: S
         actuators=tuple(i for i, f in named if f.type == "actuator"),
         sensors=sensors,
         decay=(t.number("fault_decay_per_s", 0.0, default=0.0),) * len(sensors),
-        poles=_poles(t) if gains is None else (),
+        poles=_poles(t) if gains is None and form != DIRECT else (),
         low_pass_s=t.number("low_pass_s", 0.0, 1e3, 0.1),
-        form=t.text("form", DISCRETE, FORMS),
+        form=form,
         trust=trust,
         gains=gains,
         isolate=read_isolate(t),
     )
-    if spec.gains is not None and spec.form == DISCRETE:
+    if spec.gains is not None and spec.form != HOLD:
         raise t.error("gains", f'chosen gains are those of continuous time; give form = "{HOLD}"')
     t.close()
     return spec

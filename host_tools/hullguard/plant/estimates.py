@@ -15,6 +15,7 @@ from hullguard.design.design import Design
 from hullguard.design.uio_generator import UioDesign, uio_table
 from hullguard.design.uio_isolate import Isolation, isolations
 from hullguard.model.table import Array
+from hullguard.model.uio import DIRECT
 from hullguard.plant.run import Trace
 from hullguard.plant.unknown import Emulated
 
@@ -56,8 +57,8 @@ def truths(design: Design, made: UioDesign, reading: Array, emulated: Emulated) 
     moved = np.zeros((len(reading), n))
     moved[1:] = emulated.state[1:] - emulated.state[:-1] @ model.plant.A.T - reading[:-1, model.inputs] @ model.plant.B.T
     faults = [model.faults[f].signal for f in made.spec.sensors]
-    rows = made.linear.output[:, :n] / a
-    rebuilt = low_passed(moved @ np.vstack([rows[:p], rows[p + r : len(rows) - n]]).T, a)
+    first, count = 0 if made.spec.form == DIRECT else n + r, len(made.names) - r - n
+    rebuilt = low_passed(moved @ -made.follows[first : first + count].T / a, a)  # g follows -a P x
     of_sensors = low_passed(reading[:, faults] - emulated.readings[:, faults], a)
     return np.hstack([rebuilt[:, :p], of_sensors, rebuilt[:, p:], emulated.state])
 
