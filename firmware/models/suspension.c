@@ -1079,7 +1079,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 2U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 50U, .latch = false},
     .history = 121U, .window = 0U, .residuals = 3U,
-    .codes = 15U, .reals = 676UL, .sums = 0UL,
+    .codes = 10U, .reals = 686UL, .sums = 0UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -1131,7 +1131,7 @@ hg_status hg_suspension_node_start(hg_suspension_node *self, hg_start how)
     }
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
-                     .alarm = self->alarm, .code = self->code, .codes = 15U, .real = self->real, .reals = 676UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 10U, .real = self->real, .reals = 686UL,
                      .sum = NULL, .sums = 0UL},
         .link = self->link,
         .closing = self->closing,

@@ -17,6 +17,39 @@
 #if HG_GENERATORS_MAX < 2U
 #error "model suspension needs HG_GENERATORS_MAX of at least 2"
 #endif
+#if !HG_WITH_MODES
+#error "model suspension needs HG_WITH_MODES"
+#endif
+#if (HG_ONLY_GROUPS != 0U) && (HG_ONLY_GROUPS != 2U)
+#error "model suspension needs HG_ONLY_GROUPS of 2, or 0"
+#endif
+#if HG_ONLY_GROUP_SIGNALS != 0U
+#error "model suspension needs HG_ONLY_GROUP_SIGNALS of 0"
+#endif
+#if (HG_ONLY_WIDTH != 0U) && (HG_ONLY_WIDTH != 5U)
+#error "model suspension needs HG_ONLY_WIDTH of 5, or 0"
+#endif
+#if (HG_ONLY_HISTORY != 0U) && (HG_ONLY_HISTORY != 121U)
+#error "model suspension needs HG_ONLY_HISTORY of 121, or 0"
+#endif
+#if (HG_ONLY_GENERATORS != 0U) && (HG_ONLY_GENERATORS != 2U)
+#error "model suspension needs HG_ONLY_GENERATORS of 2, or 0"
+#endif
+#if (HG_ONLY_JUDGED != 0U) && (HG_ONLY_JUDGED != 2U)
+#error "model suspension needs HG_ONLY_JUDGED of 2, or 0"
+#endif
+#if HG_ONLY_ORDER != 0U
+#error "model suspension needs HG_ONLY_ORDER of 0"
+#endif
+#if HG_ONLY_RESIDUALS != 0U
+#error "model suspension needs HG_ONLY_RESIDUALS of 0"
+#endif
+#if HG_ONLY_IN_ORDER != 0U
+#error "model suspension needs HG_ONLY_IN_ORDER of 0"
+#endif
+#if HG_ONLY_READ != 0U
+#error "model suspension needs HG_ONLY_READ of 0"
+#endif
 #if HG_REAL_Q31
 #error "suspension.toml: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32"
 #endif
@@ -77,9 +110,9 @@ typedef struct {
     hg_hull     hull[2];
     hg_alarm    alarm[2];
     hg_link     link[HG_SUSPENSION_GROUPS];
-    int32_t     code[15];
+    int32_t     code[10];
     int32_t     closing[1];
-    hg_real     real[676];
+    hg_real     real[686];
 } hg_suspension_node;
 
 /** Start a detector node; self->node is then ready for hg_node_receive().
