@@ -34,6 +34,16 @@ typedef struct {
     hg_acc d;
 } hg_linalg_sums;
 
+static inline hg_linalg_sums hg_linalg_no_sums(void)
+{
+    hg_linalg_sums none;
+    none.a = hg_acc_zero();
+    none.b = hg_acc_zero();
+    none.c = hg_acc_zero();
+    none.d = hg_acc_zero();
+    return none;
+}
+
 static inline void hg_linalg_add_four(hg_linalg_sums *sum, const hg_real *row, const hg_real *x, uint8_t cols)
 {
     const hg_real *a = row;
@@ -74,7 +84,7 @@ static inline void hg_linalg_rows(const hg_matrix *m, const hg_real *x, const hg
     const hg_real *b = n->data;
     uint8_t i = 0U;
     while ((HG_REAL_Q31 == 0) && ((uint8_t)(rows - i) >= 4U)) {
-        hg_linalg_sums sum = {.a = hg_acc_zero(), .b = hg_acc_zero(), .c = hg_acc_zero(), .d = hg_acc_zero()};
+        hg_linalg_sums sum = hg_linalg_no_sums();
         hg_linalg_add_four(&sum, a, x, m_cols);
         hg_linalg_add_four(&sum, b, y, n_cols);
         out[i] = hg_acc_real(sum.a, m->exponent);
@@ -86,7 +96,7 @@ static inline void hg_linalg_rows(const hg_matrix *m, const hg_real *x, const hg
         i += 4U;
     }
     while ((uint8_t)(rows - i) >= 2U) {
-        hg_linalg_sums sum = {.a = hg_acc_zero(), .b = hg_acc_zero(), .c = hg_acc_zero(), .d = hg_acc_zero()};
+        hg_linalg_sums sum = hg_linalg_no_sums();
         hg_linalg_add_two(&sum, a, x, m_cols);
         hg_linalg_add_two(&sum, b, y, n_cols);
         out[i] = hg_acc_real(sum.a, m->exponent);
