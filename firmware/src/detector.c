@@ -367,8 +367,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
     hg_real *row = hg_ring_row(&self->radii, lag);
     hg_real *increase = self->past;
     uint8_t place = config->signals;
-    const bool followed = with_mismatch(config) || BY_ZONOTOPE(config); /* a hull asks for no more than the new radii */
-    for (uint8_t g = 0U; followed && (g < config->width); g++) {
+    for (uint8_t g = 0U; g < config->width; g++) {
         increase[g] = row[g];
     }
     hg_hold_past(&self->memory.hold[group], lag, &row[first]);
@@ -380,7 +379,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
         }
         place += predict->width;
     }
-    for (uint8_t g = 0U; followed && (g < place); g++) {
+    for (uint8_t g = 0U; g < place; g++) {
         increase[g] = difference(row[g], increase[g]);
     }
     if (with_mismatch(config)) {

@@ -29,7 +29,7 @@ static bool tables_there(const hg_hull_config *config)
 
 static bool modes_valid(const hg_hull_config *config)
 {
-    bool valid = (config->modes == 0U) || ((config->mode_decay != NULL) && (config->mode_input != NULL) && (config->mode_output != NULL) &&
+    bool valid = (config->modes == 0U) || ((HG_WITH_MODES != 0) && (config->mode_decay != NULL) && (config->mode_input != NULL) && (config->mode_output != NULL) &&
                                            (config->mode_rest != NULL) && (config->mode_moving != NULL));
     for (uint8_t m = 0U; valid && (m < config->modes); m++) {
         valid = (config->mode_decay[m] >= HG_REAL_ZERO) && (config->mode_decay[m] < HG_REAL_C(1.0));
@@ -40,7 +40,7 @@ static bool modes_valid(const hg_hull_config *config)
 bool hg_hull_valid(const hg_hull_config *config, uint8_t ring_width, uint8_t ring_length)
 {
     bool valid = (config->residuals >= 1U) && (config->width >= 1U) && (config->settle >= 1U) && (config->settle < UINT16_MAX) &&
-                 hg_exponent_valid(config->exponent) && tables_there(config) && (modes_of(config) == config->modes) && modes_valid(config);
+                 hg_exponent_valid(config->exponent) && tables_there(config) && modes_valid(config);
     valid = valid && HG_SIZE_FITS(HG_ONLY_RESIDUALS, config->residuals) && HG_SIZE_FITS(HG_ONLY_READ, config->width);
     valid = valid && ((HG_ONLY_IN_ORDER == 0U) || hg_linalg_in_order(config->signal, config->width));
     valid = valid && HG_SIZE_FITS(HG_ONLY_WIDTH, ring_width) && HG_SIZE_FITS(HG_ONLY_HISTORY, ring_length);
