@@ -3888,7 +3888,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 29U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 5U, .latch = false},
     .history = 10U, .window = 0U, .residuals = 29U,
-    .codes = 42U, .reals = 595UL, .sums = 0UL,
+    .codes = 28U, .reals = 623UL, .sums = 0UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -3944,7 +3944,7 @@ hg_status hg_openacc_node_start(hg_openacc_node *self, hg_start how)
     }
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
-                     .alarm = self->alarm, .code = self->code, .codes = 42U, .real = self->real, .reals = 595UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 28U, .real = self->real, .reals = 623UL,
                      .sum = NULL, .sums = 0UL},
         .link = self->link,
         .closing = self->closing,

@@ -17,6 +17,36 @@
 #if HG_GENERATORS_MAX < 29U
 #error "model openacc needs HG_GENERATORS_MAX of at least 29"
 #endif
+#if (HG_ONLY_GROUPS != 0U) && (HG_ONLY_GROUPS != 6U)
+#error "model openacc needs HG_ONLY_GROUPS of 6, or 0"
+#endif
+#if HG_ONLY_GROUP_SIGNALS != 0U
+#error "model openacc needs HG_ONLY_GROUP_SIGNALS of 0"
+#endif
+#if (HG_ONLY_WIDTH != 0U) && (HG_ONLY_WIDTH != 14U)
+#error "model openacc needs HG_ONLY_WIDTH of 14, or 0"
+#endif
+#if (HG_ONLY_HISTORY != 0U) && (HG_ONLY_HISTORY != 10U)
+#error "model openacc needs HG_ONLY_HISTORY of 10, or 0"
+#endif
+#if (HG_ONLY_GENERATORS != 0U) && (HG_ONLY_GENERATORS != 29U)
+#error "model openacc needs HG_ONLY_GENERATORS of 29, or 0"
+#endif
+#if (HG_ONLY_JUDGED != 0U) && (HG_ONLY_JUDGED != 29U)
+#error "model openacc needs HG_ONLY_JUDGED of 29, or 0"
+#endif
+#if HG_ONLY_ORDER != 0U
+#error "model openacc needs HG_ONLY_ORDER of 0"
+#endif
+#if (HG_ONLY_RESIDUALS != 0U) && (HG_ONLY_RESIDUALS != 1U)
+#error "model openacc needs HG_ONLY_RESIDUALS of 1, or 0"
+#endif
+#if HG_ONLY_IN_ORDER != 0U
+#error "model openacc needs HG_ONLY_IN_ORDER of 0"
+#endif
+#if HG_ONLY_READ != 0U
+#error "model openacc needs HG_ONLY_READ of 0"
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -100,9 +130,9 @@ typedef struct {
     hg_hull     hull[29];
     hg_alarm    alarm[29];
     hg_link     link[HG_OPENACC_GROUPS];
-    int32_t     code[42];
+    int32_t     code[28];
     int32_t     closing[1];
-    hg_real     real[595];
+    hg_real     real[623];
 } hg_openacc_node;
 
 /** Start a detector node; self->node is then ready for hg_node_receive().

@@ -408,7 +408,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 1U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 5U, .latch = false},
     .history = 18U, .window = 0U, .residuals = 2U,
-    .codes = 18U, .reals = 140UL, .sums = 0UL,
+    .codes = 12U, .reals = 152UL, .sums = 0UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -460,7 +460,7 @@ hg_status hg_platoon_node_start(hg_platoon_node *self, hg_start how)
     }
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
-                     .alarm = self->alarm, .code = self->code, .codes = 18U, .real = self->real, .reals = 140UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 12U, .real = self->real, .reals = 152UL,
                      .sum = NULL, .sums = 0UL},
         .link = self->link,
         .closing = self->closing,

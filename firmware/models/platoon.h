@@ -14,6 +14,36 @@
 #if HG_GROUP_SIGNALS_MAX < 3U
 #error "model platoon needs HG_GROUP_SIGNALS_MAX of at least 3"
 #endif
+#if (HG_ONLY_GROUPS != 0U) && (HG_ONLY_GROUPS != 2U)
+#error "model platoon needs HG_ONLY_GROUPS of 2, or 0"
+#endif
+#if (HG_ONLY_GROUP_SIGNALS != 0U) && (HG_ONLY_GROUP_SIGNALS != 3U)
+#error "model platoon needs HG_ONLY_GROUP_SIGNALS of 3, or 0"
+#endif
+#if (HG_ONLY_WIDTH != 0U) && (HG_ONLY_WIDTH != 6U)
+#error "model platoon needs HG_ONLY_WIDTH of 6, or 0"
+#endif
+#if (HG_ONLY_HISTORY != 0U) && (HG_ONLY_HISTORY != 18U)
+#error "model platoon needs HG_ONLY_HISTORY of 18, or 0"
+#endif
+#if (HG_ONLY_GENERATORS != 0U) && (HG_ONLY_GENERATORS != 1U)
+#error "model platoon needs HG_ONLY_GENERATORS of 1, or 0"
+#endif
+#if (HG_ONLY_JUDGED != 0U) && (HG_ONLY_JUDGED != 1U)
+#error "model platoon needs HG_ONLY_JUDGED of 1, or 0"
+#endif
+#if (HG_ONLY_ORDER != 0U) && (HG_ONLY_ORDER != 4U)
+#error "model platoon needs HG_ONLY_ORDER of 4, or 0"
+#endif
+#if (HG_ONLY_RESIDUALS != 0U) && (HG_ONLY_RESIDUALS != 2U)
+#error "model platoon needs HG_ONLY_RESIDUALS of 2, or 0"
+#endif
+#if (HG_ONLY_IN_ORDER != 0U) && (HG_ONLY_IN_ORDER != 1U)
+#error "model platoon needs HG_ONLY_IN_ORDER of 1, or 0"
+#endif
+#if (HG_ONLY_READ != 0U) && (HG_ONLY_READ != 6U)
+#error "model platoon needs HG_ONLY_READ of 6, or 0"
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -75,9 +105,9 @@ typedef struct {
     hg_hull     hull[1];
     hg_alarm    alarm[1];
     hg_link     link[HG_PLATOON_GROUPS];
-    int32_t     code[18];
+    int32_t     code[12];
     int32_t     closing[3];
-    hg_real     real[140];
+    hg_real     real[152];
 } hg_platoon_node;
 
 /** Start a detector node; self->node is then ready for hg_node_receive().

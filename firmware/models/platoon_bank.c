@@ -3498,7 +3498,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 8U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 5U, .latch = false},
     .history = 30U, .window = 30U, .residuals = 9U,
-    .codes = 18U, .reals = 406UL, .sums = 104UL,
+    .codes = 12U, .reals = 418UL, .sums = 104UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -3551,7 +3551,7 @@ hg_status hg_platoon_bank_node_start(hg_platoon_bank_node *self, hg_start how)
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL,
                      .bank = self->bank,
-                     .alarm = self->alarm, .code = self->code, .codes = 18U, .real = self->real, .reals = 406UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 12U, .real = self->real, .reals = 418UL,
                      .sum = self->sum, .sums = 104UL},
         .link = self->link,
         .closing = self->closing,

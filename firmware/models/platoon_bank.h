@@ -20,6 +20,36 @@
 #if !HG_WITH_BANK
 #error "model platoon_bank needs HG_WITH_BANK"
 #endif
+#if (HG_ONLY_GROUPS != 0U) && (HG_ONLY_GROUPS != 2U)
+#error "model platoon_bank needs HG_ONLY_GROUPS of 2, or 0"
+#endif
+#if (HG_ONLY_GROUP_SIGNALS != 0U) && (HG_ONLY_GROUP_SIGNALS != 3U)
+#error "model platoon_bank needs HG_ONLY_GROUP_SIGNALS of 3, or 0"
+#endif
+#if (HG_ONLY_WIDTH != 0U) && (HG_ONLY_WIDTH != 6U)
+#error "model platoon_bank needs HG_ONLY_WIDTH of 6, or 0"
+#endif
+#if (HG_ONLY_HISTORY != 0U) && (HG_ONLY_HISTORY != 30U)
+#error "model platoon_bank needs HG_ONLY_HISTORY of 30, or 0"
+#endif
+#if (HG_ONLY_GENERATORS != 0U) && (HG_ONLY_GENERATORS != 1U)
+#error "model platoon_bank needs HG_ONLY_GENERATORS of 1, or 0"
+#endif
+#if (HG_ONLY_JUDGED != 0U) && (HG_ONLY_JUDGED != 8U)
+#error "model platoon_bank needs HG_ONLY_JUDGED of 8, or 0"
+#endif
+#if (HG_ONLY_ORDER != 0U) && (HG_ONLY_ORDER != 4U)
+#error "model platoon_bank needs HG_ONLY_ORDER of 4, or 0"
+#endif
+#if (HG_ONLY_RESIDUALS != 0U) && (HG_ONLY_RESIDUALS != 2U)
+#error "model platoon_bank needs HG_ONLY_RESIDUALS of 2, or 0"
+#endif
+#if (HG_ONLY_IN_ORDER != 0U) && (HG_ONLY_IN_ORDER != 1U)
+#error "model platoon_bank needs HG_ONLY_IN_ORDER of 1, or 0"
+#endif
+#if (HG_ONLY_READ != 0U) && (HG_ONLY_READ != 6U)
+#error "model platoon_bank needs HG_ONLY_READ of 6, or 0"
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -83,9 +113,9 @@ typedef struct {
     hg_acc      sum[104];
     hg_alarm    alarm[8];
     hg_link     link[HG_PLATOON_BANK_GROUPS];
-    int32_t     code[18];
+    int32_t     code[12];
     int32_t     closing[3];
-    hg_real     real[406];
+    hg_real     real[418];
 } hg_platoon_bank_node;
 
 /** Start a detector node; self->node is then ready for hg_node_receive().

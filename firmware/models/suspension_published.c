@@ -632,7 +632,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 1U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 50U, .latch = false},
     .history = 121U, .window = 0U, .residuals = 2U,
-    .codes = 12U, .reals = 526UL, .sums = 0UL,
+    .codes = 8U, .reals = 534UL, .sums = 0UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -684,7 +684,7 @@ hg_status hg_suspension_published_node_start(hg_suspension_published_node *self,
     }
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
-                     .alarm = self->alarm, .code = self->code, .codes = 12U, .real = self->real, .reals = 526UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 8U, .real = self->real, .reals = 534UL,
                      .sum = NULL, .sums = 0UL},
         .link = self->link,
         .closing = self->closing,

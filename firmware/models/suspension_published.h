@@ -15,6 +15,39 @@
 #if HG_GROUP_SIGNALS_MAX < 3U
 #error "model suspension_published needs HG_GROUP_SIGNALS_MAX of at least 3"
 #endif
+#if !HG_WITH_MODES
+#error "model suspension_published needs HG_WITH_MODES"
+#endif
+#if (HG_ONLY_GROUPS != 0U) && (HG_ONLY_GROUPS != 2U)
+#error "model suspension_published needs HG_ONLY_GROUPS of 2, or 0"
+#endif
+#if HG_ONLY_GROUP_SIGNALS != 0U
+#error "model suspension_published needs HG_ONLY_GROUP_SIGNALS of 0"
+#endif
+#if (HG_ONLY_WIDTH != 0U) && (HG_ONLY_WIDTH != 4U)
+#error "model suspension_published needs HG_ONLY_WIDTH of 4, or 0"
+#endif
+#if (HG_ONLY_HISTORY != 0U) && (HG_ONLY_HISTORY != 121U)
+#error "model suspension_published needs HG_ONLY_HISTORY of 121, or 0"
+#endif
+#if (HG_ONLY_GENERATORS != 0U) && (HG_ONLY_GENERATORS != 1U)
+#error "model suspension_published needs HG_ONLY_GENERATORS of 1, or 0"
+#endif
+#if (HG_ONLY_JUDGED != 0U) && (HG_ONLY_JUDGED != 1U)
+#error "model suspension_published needs HG_ONLY_JUDGED of 1, or 0"
+#endif
+#if HG_ONLY_ORDER != 0U
+#error "model suspension_published needs HG_ONLY_ORDER of 0"
+#endif
+#if HG_ONLY_RESIDUALS != 0U
+#error "model suspension_published needs HG_ONLY_RESIDUALS of 0"
+#endif
+#if HG_ONLY_IN_ORDER != 0U
+#error "model suspension_published needs HG_ONLY_IN_ORDER of 0"
+#endif
+#if HG_ONLY_READ != 0U
+#error "model suspension_published needs HG_ONLY_READ of 0"
+#endif
 #if HG_REAL_Q31
 #error "suspension_published.toml: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use \
        float32"
@@ -72,9 +105,9 @@ typedef struct {
     hg_hull     hull[1];
     hg_alarm    alarm[1];
     hg_link     link[HG_SUSPENSION_PUBLISHED_GROUPS];
-    int32_t     code[12];
+    int32_t     code[8];
     int32_t     closing[1];
-    hg_real     real[526];
+    hg_real     real[534];
 } hg_suspension_published_node;
 
 /** Start a detector node; self->node is then ready for hg_node_receive().

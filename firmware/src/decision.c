@@ -2,21 +2,12 @@
 
 #include <stddef.h>
 
-bool hg_decision_exceeds(const hg_real *r, const hg_real *J, uint8_t n)
-{
-    bool exceeds = false;
-    for (uint8_t i = 0U; i < n; i++) {
-        exceeds = exceeds || (!(hg_real_abs(r[i]) <= J[i])); /* written so that NaN is an alarm, never blindness */
-    }
-    return exceeds;
-}
-
 hg_status hg_decision_start(hg_decision *self, const hg_decision_config *config, hg_alarm *alarm)
 {
     if ((self == NULL) || (config == NULL) || (alarm == NULL)) {
         return HG_E_ARGUMENT;
     }
-    if ((config->generators < 1U) || (config->generators > HG_GENERATORS_MAX) || (config->up < 1U) || (config->down < 1U) ||
+    if ((config->generators < 1U) || (config->generators > HG_GENERATORS_MAX) || (!HG_SIZE_FITS(HG_ONLY_JUDGED, config->generators)) || (config->up < 1U) || (config->down < 1U) ||
         (config->feeds == NULL) || (config->faults == NULL)) {
         return HG_E_CONFIG;
     }
@@ -83,7 +74,7 @@ hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32
     const hg_decision_config *config = self->config;
     hg_plant plant = evidence->ready ? HG_PLANT_NONE : HG_PLANT_STARTING;
     uint32_t common = 0U;
-    for (uint8_t g = 0U; g < config->generators; g++) {
+    for (uint8_t g = 0U; g < HG_SIZE(HG_ONLY_JUDGED, config->generators); g++) {
         hg_alarm *alarm = &self->alarm[g];
         alarm_step(alarm, config, config->feeds[g], ((evidence->alarm >> g) & 1U) != 0U, evidence);
         if (alarm->state != HG_PLANT_NONE) {

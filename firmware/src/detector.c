@@ -6,10 +6,20 @@
 /* cppcheck-suppress-macro misra-c2012-10.8 */
 #define WIDER HG_REAL_C(1.000001) /* more than the rounding of a difference can take away */
 
-/* Parts that an image does without are constants here, so that the compiler drops them and the linker what they call. */
+/* Parts that an image does without are constants here, so that the compiler drops them and the linker what they call; so are sizes of config.h. */
 static uint8_t predictors_of(const hg_detector_config *config)
 {
     return (HG_WITH_PREDICT != 0) ? config->predictors : 0U;
+}
+
+static uint8_t groups_of(const hg_detector_config *config)
+{
+    return HG_SIZE(HG_ONLY_GROUPS, config->groups);
+}
+
+static uint8_t generators_of(const hg_detector_config *config)
+{
+    return HG_SIZE(HG_ONLY_GENERATORS, config->generators);
 }
 
 static uint8_t banks_of(const hg_detector_config *config)
@@ -34,7 +44,7 @@ static bool parts_there(const hg_detector_config *config)
 
 uint32_t hg_detector_reals(const hg_detector_config *config)
 {
-    uint32_t reals = (2U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals);
+    uint32_t reals = (2U * (uint32_t)config->width) + (2U * (uint32_t)config->residuals) + HG_HOLD_REALS(config->signals);
     reals += HG_RING_REALS(config->width, config->history) + HG_RING_REALS(config->signals, config->window);
     for (uint8_t g = 0U; g < config->generators; g++) {
         reals += HG_RESIDUAL_REALS(config->residual[g].order, config->residual[g].width);
@@ -68,6 +78,8 @@ static bool counts_valid(const hg_detector_config *config)
                  (config->groups <= HG_GROUPS_MAX) && (config->predictors <= HG_GROUPS_MAX) && (config->hold != NULL);
     valid = valid && (judged >= 1U) && (judged <= HG_GENERATORS_MAX) && (judged == config->decision.generators);
     valid = valid && ((config->generators == 0U) || ((config->residual != NULL) && ((config->hull != NULL) != (config->zonotope != NULL))));
+    valid = valid && HG_SIZE_FITS(HG_ONLY_GROUPS, config->groups) && HG_SIZE_FITS(HG_ONLY_GENERATORS, config->generators) &&
+            HG_SIZE_FITS(HG_ONLY_WIDTH, config->width) && HG_SIZE_FITS(HG_ONLY_HISTORY, config->history);
     valid = valid && ((config->banks == 0U) || ((config->bank != NULL) && (config->window >= 1U)));
     return valid && ((config->predictors == 0U) || (config->predict != NULL));
 }
@@ -160,23 +172,24 @@ static bool generators_valid(const hg_detector_config *config)
 static hg_status start_holds(hg_detector *self)
 {
     const hg_detector_config *config = self->config;
+    hg_real *memory = &self->past[config->width];
     hg_status status = HG_OK;
     uint16_t first = 0U;
     for (uint8_t i = 0U; (status == HG_OK) && (i < config->groups); i++) {
         if ((config->hold[i].trigger == NULL) || ((first + config->hold[i].trigger->width) > config->signals)) {
             return HG_E_CONFIG;
         }
-        status = hg_hold_start(&self->memory.hold[i], &config->hold[i], &self->memory.code[HG_HOLD_CODES(first)]);
+        status = hg_hold_start(&self->memory.hold[i], &config->hold[i], &self->memory.code[HG_HOLD_CODES(first)], &memory[HG_HOLD_REALS(first)]);
         first += config->hold[i].trigger->width;
     }
     return (first == config->signals) ? status : HG_E_CONFIG;
 }
 
-/* Everything between the holds and the decision takes its memory from one piece, in this order. */
+/* Everything between the holds and the decision takes its memory from one piece, behind theirs and in this order. */
 static hg_status start_generators(hg_detector *self, hg_start how)
 {
     const hg_detector_config *config = self->config;
-    hg_real *memory = &self->past[config->width];
+    hg_real *memory = &self->past[config->width + HG_HOLD_REALS(config->signals)];
     hg_status status = hg_ring_start(&self->radii, config->width, config->history, memory);
     self->radius = memory;
     memory = &memory[HG_RING_REALS(config->width, config->history)];
@@ -354,8 +367,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
     hg_real *row = hg_ring_row(&self->radii, lag);
     hg_real *increase = self->past;
     uint8_t place = config->signals;
-    const bool followed = with_mismatch(config) || BY_ZONOTOPE(config); /* a hull asks for no more than the new radii */
-    for (uint8_t g = 0U; followed && (g < config->width); g++) {
+    for (uint8_t g = 0U; g < config->width; g++) {
         increase[g] = row[g];
     }
     hg_hold_past(&self->memory.hold[group], lag, &row[first]);
@@ -367,7 +379,7 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
         }
         place += predict->width;
     }
-    for (uint8_t g = 0U; followed && (g < place); g++) {
+    for (uint8_t g = 0U; g < place; g++) {
         increase[g] = difference(row[g], increase[g]);
     }
     if (with_mismatch(config)) {
@@ -381,27 +393,39 @@ static void widen_past(hg_detector *self, uint8_t group, uint8_t first, uint8_t 
     }
 }
 
+/* The radii of one group turn out wider, `rewind` samples back. */
+static void rewrite(hg_detector *self, uint8_t group, uint8_t first, uint8_t rewind)
+{
+    const hg_detector_config *config = self->config;
+    const uint8_t kept = (uint8_t)(HG_SIZE(HG_ONLY_HISTORY, config->history) - 1U);
+    /* What was before the beginning is the initial state's business, which the thresholds hold already. */
+    const uint8_t known = (rewind < self->samples) ? rewind : self->samples;
+    const uint8_t lags = (known < kept) ? known : kept;
+    if ((predictors_of(config) == 0U) && (!with_mismatch(config)) && (!BY_ZONOTOPE(config))) {
+        hg_hold_rewrite(&self->memory.hold[group], &self->radii, first, lags); /* a hull asks for no more than the new radii */
+    } else {
+        for (uint8_t lag = 1U; lag <= lags; lag++) {
+            widen_past(self, group, first, lag);
+        }
+    }
+}
+
 /* Close the sample in every hold; radii of the past are corrected where a loss has just shown. */
 static void step_holds(hg_detector *self, hg_evidence *evidence)
 {
     const hg_detector_config *config = self->config;
     uint8_t first = 0U;
     self->radius = hg_ring_open(&self->radii);
-    for (uint8_t i = 0U; i < config->groups; i++) {
+    for (uint8_t i = 0U; i < groups_of(config); i++) {
         hg_hold *hold = &self->memory.hold[i];
         uint8_t rewind;
         hg_hold_step(hold, &self->value[first], &self->radius[first], &rewind);
-        if (hg_hold_doubt(hold)) {
-            evidence->doubt |= (uint8_t)(1U << i);
-        }
+        evidence->doubt |= (uint8_t)((hg_hold_doubt(hold) ? 1U : 0U) << i);
         if (rewind > 0U) {
             evidence->rewound |= (uint8_t)(1U << i);
-            /* What was before the beginning is the initial state's business, which the thresholds hold already. */
-            for (uint8_t lag = 1U; (lag <= rewind) && (lag <= self->samples) && (lag < config->history); lag++) {
-                widen_past(self, i, first, lag);
-            }
+            rewrite(self, i, first, rewind);
         }
-        first += config->hold[i].trigger->width;
+        first += HG_SIZE(HG_ONLY_GROUP_SIGNALS, config->hold[i].trigger->width);
     }
     derive(self, evidence->doubt);
     self->samples = (self->samples < UINT8_MAX) ? (uint8_t)(self->samples + 1U) : UINT8_MAX;
@@ -429,8 +453,8 @@ static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
     hg_status status = HG_OK;
     hg_real *r = self->r;
     hg_real *J = self->J;
-    for (uint8_t g = 0U; g < self->config->generators; g++) {
-        const uint8_t n = self->config->residual[g].residuals;
+    for (uint8_t g = 0U; g < generators_of(self->config); g++) {
+        const uint8_t n = HG_SIZE(HG_ONLY_RESIDUALS, self->config->residual[g].residuals);
         const hg_status moved = hg_residual_step(&self->memory.residual[g], self->value, r);
         bool ready = step_threshold(self, g, J);
         if (moved != HG_OK) {

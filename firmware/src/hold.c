@@ -4,6 +4,11 @@
 
 #define GOOD_IN_ROW 2U /* frames after which the sender's level is known: it follows from two successive ones */
 
+static uint8_t width_of(const hg_hold_config *config)
+{
+    return HG_SIZE(HG_ONLY_GROUP_SIGNALS, config->trigger->width);
+}
+
 static uint8_t horizon(const hg_hold_config *config)
 {
     return (uint8_t)(config->trigger->interval_max + config->margin);
@@ -21,7 +26,7 @@ static bool radii_valid(const hg_real *radius, uint16_t n)
 
 static bool tables_valid(const hg_hold_config *config)
 {
-    bool valid = (config->trigger != NULL) && hg_trigger_valid(config->trigger);
+    bool valid = (config->trigger != NULL) && hg_trigger_valid(config->trigger) && HG_SIZE_FITS(HG_ONLY_GROUP_SIGNALS, config->trigger->width);
     valid = valid && (((uint16_t)config->trigger->interval_max + config->margin) < UINT8_MAX);
     if (valid && (config->trigger->width > 0U)) {
         const uint8_t width = config->trigger->width;
@@ -36,9 +41,9 @@ static bool tables_valid(const hg_hold_config *config)
     return valid;
 }
 
-hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes)
+hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes, hg_real *reals)
 {
-    if ((self == NULL) || (config == NULL) || (codes == NULL)) {
+    if ((self == NULL) || (config == NULL) || (codes == NULL) || (reals == NULL)) {
         return HG_E_ARGUMENT;
     }
     if (!tables_valid(config)) {
@@ -48,7 +53,8 @@ hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *co
     self->config = config;
     self->sent = codes;
     self->previous = &codes[width];
-    self->promise = &codes[2U * (uint16_t)width];
+    self->value = reals;
+    self->promise = &reals[width];
     self->age = UINT8_MAX;
     self->good = 0U;
     self->level = 0U;
@@ -64,7 +70,8 @@ hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *co
     for (uint8_t g = 0U; g < width; g++) {
         self->sent[g] = HG_CODE_INVALID;
         self->previous[g] = HG_CODE_INVALID;
-        self->promise[g] = 0;
+        self->value[g] = config->middle[g];
+        self->promise[g] = HG_REAL_MAX;
     }
     return HG_OK;
 }
@@ -93,6 +100,21 @@ static int32_t threshold(const hg_hold *self, uint8_t g)
     return widest;
 }
 
+/* What there is to know of a signal from its last frame alone. The sender would speak if the true value were further away than it promised. */
+static void take(hg_hold *self, uint8_t g)
+{
+    const hg_hold_config *config = self->config;
+    if (self->sent[g] == HG_CODE_INVALID) {
+        self->holes = true;
+        self->value[g] = config->middle[g];
+        self->promise[g] = HG_REAL_MAX; /* nothing */
+    } else {
+        const hg_code_scale *scale = &config->scale[g];
+        self->value[g] = hg_code_value(scale, self->sent[g]);
+        self->promise[g] = hg_real_add(hg_real_of_code(scale->resolution, scale->exponent, threshold(self, g)), config->half[g]);
+    }
+}
+
 hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
 {
     if (self->fresh) {
@@ -103,21 +125,19 @@ hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
     const bool whole = continues && (!self->lost) && (self->good > 0U);
     self->gap = self->doubt && (!whole);
     self->gap_age = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
-    bool holes = false;
     for (uint8_t g = 0U; g < trigger->width; g++) {
         self->previous[g] = self->sent[g];
         self->sent[g] = code[g];
-        holes = holes || (code[g] == HG_CODE_INVALID);
     }
-    self->holes = holes;
     self->recovering = self->seen && (!whole);
     self->seen = true;
     self->good = whole ? GOOD_IN_ROW : 1U;
     self->level = whole ? hg_trigger_level(trigger, self->sent, self->previous) : 0U;
     /* Until the next frame, or until one is known to be lost and nothing is promised. */
     self->silence = silence(self);
+    self->holes = false;
     for (uint8_t g = 0U; g < trigger->width; g++) {
-        self->promise[g] = threshold(self, g);
+        take(self, g);
     }
     self->lost = false;
     self->fresh = true;
@@ -131,94 +151,112 @@ void hg_hold_lose(hg_hold *self)
 
 static const hg_real *slew(const hg_hold_config *config, uint8_t age)
 {
-    return &config->slew[((uint32_t)age - 1U) * config->trigger->width];
+    return &config->slew[((uint32_t)age - 1U) * width_of(config)];
 }
 
-/* The last value, and how far the true one can be from it by now. */
-static void set_slewed(const hg_hold *self, const hg_real *moved, hg_real *value, hg_real *radius)
+/* The last value, and how far the true one can be from it by now: as far as it may have `moved`, but within the `limit`. Is a radius smaller by that? */
+static bool set_held(const hg_hold *self, const hg_real *moved, const hg_real *limit, hg_real *value, hg_real *radius)
 {
-    const hg_code_scale *scale = self->config->scale;
-    const uint8_t width = self->config->trigger->width;
+    const uint8_t width = width_of(self->config);
+    bool limited = false;
     for (uint8_t g = 0U; g < width; g++) {
-        value[g] = hg_code_value(&scale[g], self->sent[g]);
-        radius[g] = moved[g];
+        const hg_real widest = moved[g];
+        const hg_real least = limit[g];
+        const bool tighter = least < widest;
+        radius[g] = tighter ? least : widest;
+        value[g] = self->value[g];
+        limited = limited || tighter;
     }
+    return limited;
 }
 
-/* The same of signals without a value. */
-static void set_unknown(const hg_hold *self, hg_real *value, hg_real *radius)
+/* The radii of signals without a value. */
+static void set_unknown(const hg_hold *self, hg_real *radius)
 {
     const hg_hold_config *config = self->config;
-    for (uint8_t g = 0U; g < config->trigger->width; g++) {
+    for (uint8_t g = 0U; g < width_of(config); g++) {
         if (self->sent[g] == HG_CODE_INVALID) {
-            value[g] = config->middle[g];
             radius[g] = config->span[g];
         }
     }
 }
 
-/* The sender would have spoken if the true value were further away than it promised. Was a radius made smaller by that? */
-static bool rely_on_silence(const hg_hold *self, bool trusted, hg_real *radius)
+/* How far a signal may have moved since the last good frame, when the sender's silence says nothing. */
+static const hg_real *moved_since(const hg_hold_config *config, uint8_t age)
 {
-    const hg_hold_config *config = self->config;
-    const hg_code_scale *scale = config->scale;
-    const uint8_t width = config->trigger->width;
-    bool relied = false;
-    for (uint8_t g = 0U; g < width; g++) {
-        const hg_real promised = hg_real_add(hg_real_of_code(scale[g].resolution, scale[g].exponent, self->promise[g]), config->half[g]);
-        /* What is not to be trusted is compared as well, with 0: a sample costs the same with a frame and without. */
-        const hg_real limit = (trusted && (self->sent[g] != HG_CODE_INVALID)) ? radius[g] : HG_REAL_ZERO;
-        const bool tighter = promised < limit;
-        radius[g] = tighter ? promised : radius[g];
-        relied = relied || tighter;
+    const hg_real *moved = config->span;
+    if (age == 0U) {
+        moved = config->half;
+    } else if (age <= horizon(config)) {
+        moved = slew(config, age);
+    } else {
+        /* stale */
     }
-    return relied;
+    return moved;
 }
 
 void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewind)
 {
     const hg_hold_config *config = self->config;
     const bool was_in_doubt = self->doubt;
-    if (self->fresh) {
-        self->age = 0U;
-    } else if (self->age < UINT8_MAX) {
-        self->age++;
-    } else {
-        /* nothing known for so long that counting on would not say more */
+    const bool fresh = self->fresh;
+    const uint8_t older = (self->age < UINT8_MAX) ? (uint8_t)(self->age + 1U) : UINT8_MAX;
+    const uint8_t age = fresh ? 0U : older;
+    const bool lost = self->lost || (age >= config->trigger->interval_max); /* the sender speaks at least this often */
+    const hg_real *moved = moved_since(config, age);
+    /* What is not to be trusted is compared as well, with itself: a sample costs the same with a frame and without. */
+    const bool trusted = (!lost) && (age > self->silence);
+    const bool conditional = set_held(self, moved, trusted ? self->promise : moved, value, radius);
+    if (self->holes) {
+        set_unknown(self, radius);
     }
-    const bool stale = self->age > horizon(config);
-    if ((!self->fresh) && (self->age >= config->trigger->interval_max)) {
-        self->lost = true; /* the sender speaks at least this often */
-    }
-    if (self->lost) {
+    if (lost) {
         self->good = 0U;
     }
-    const bool held = (!stale) && (!self->fresh);
-    set_slewed(self, stale ? config->span : (held ? slew(config, self->age) : config->half), value, radius);
-    if (self->holes) {
-        set_unknown(self, value, radius);
-    }
-    bool conditional = false;
-    if (config->trigger->interval_max > 1U) { /* else the sender is never silent */
-        conditional = rely_on_silence(self, held && (!self->lost) && (self->age > self->silence), radius);
-    }
-    const bool newly_lost = was_in_doubt && self->lost && (!self->fresh);
+    const bool newly_lost = was_in_doubt && lost && (!fresh);
     if (newly_lost) {
-        self->gap_age = self->age;
+        self->gap_age = age;
     }
-    *rewind = (newly_lost || (self->fresh && self->gap)) ? (uint8_t)(self->gap_age - 1U) : 0U;
-    self->doubt = (!self->fresh) && (!self->lost) && (was_in_doubt || conditional);
-    self->gap = self->fresh && self->gap;
+    self->gap = fresh && self->gap;
+    *rewind = (newly_lost || self->gap) ? (uint8_t)(self->gap_age - 1U) : 0U;
+    self->doubt = (!fresh) && (!lost) && (was_in_doubt || conditional);
+    self->age = age;
+    self->lost = lost;
     self->fresh = false;
+}
+
+/* The value that was held in between: after a frame that revealed the loss, that of the one before it. */
+static const int32_t *held_before(const hg_hold *self)
+{
+    return self->gap ? self->previous : self->sent;
 }
 
 void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius)
 {
     const hg_hold_config *config = self->config;
-    /* After a frame that revealed the loss, the value held in between is the one before it. */
-    const int32_t *held = self->gap ? self->previous : self->sent;
+    const int32_t *held = held_before(self);
     for (uint8_t g = 0U; g < config->trigger->width; g++) {
         radius[g] = (held[g] == HG_CODE_INVALID) ? config->span[g] : slew(config, (uint8_t)(self->gap_age - lag))[g];
+    }
+}
+
+void hg_hold_rewrite(const hg_hold *self, hg_ring *ring, uint8_t first, uint8_t lags)
+{
+    const hg_hold_config *config = self->config;
+    const int32_t *held = held_before(self);
+    const uint8_t width = width_of(config);
+    const int32_t back = HG_SIZE(HG_ONLY_WIDTH, ring->width);
+    const int32_t end = back * (int32_t)HG_SIZE(HG_ONLY_HISTORY, ring->length);
+    for (uint8_t g = 0U; g < width; g++) {
+        if (held[g] != HG_CODE_INVALID) { /* else the radius was that of the range already */
+            int32_t place = ((int32_t)ring->newest * back) + (int32_t)first + (int32_t)g;
+            const hg_real *moved = &slew(config, self->gap_age)[g];
+            for (uint8_t lag = lags; lag > 0U; lag--) {
+                place += (place >= back) ? -back : (end - back);
+                moved = &moved[-(int32_t)width];
+                ring->data[place] = *moved;
+            }
+        }
     }
 }
 

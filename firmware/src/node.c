@@ -212,7 +212,7 @@ static void forget_past(hg_node *self)
 {
     for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
         hg_hold *hold = &self->detector.memory.hold[i];
-        (void)hg_hold_start(hold, hold->config, hold->sent);
+        (void)hg_hold_start(hold, hold->config, hold->sent, hold->value);
         self->link[i].timed = false;
     }
     hg_detector_restart(&self->detector, HG_START_MOVING);

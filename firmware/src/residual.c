@@ -5,7 +5,8 @@
 bool hg_residual_valid(const hg_residual_config *config)
 {
     return (config->order >= 1U) && (config->residuals >= 1U) && (config->width >= 1U) && (config->signal != NULL) &&
-           hg_linalg_fits(&config->state, &config->input, config->order, config->order, config->width) &&
+           HG_SIZE_FITS(HG_ONLY_ORDER, config->order) && HG_SIZE_FITS(HG_ONLY_RESIDUALS, config->residuals) && HG_SIZE_FITS(HG_ONLY_READ, config->width) &&
+           ((HG_ONLY_IN_ORDER == 0U) || hg_linalg_in_order(config->signal, config->width)) && hg_linalg_fits(&config->state, &config->input, config->order, config->order, config->width) &&
            hg_linalg_fits(&config->output, &config->direct, config->residuals, config->order, config->width);
 }
 
@@ -32,20 +33,29 @@ void hg_residual_reset(hg_residual *self)
     }
 }
 
+/* The signals it reads, one after another. */
+static const hg_real *gathered(const hg_residual *self, const hg_real *value, uint8_t width)
+{
+    for (uint8_t g = 0U; (HG_ONLY_IN_ORDER == 0U) && (g < width); g++) {
+        self->input[g] = value[self->config->signal[g]];
+    }
+    return (HG_ONLY_IN_ORDER == 0U) ? self->input : value;
+}
+
 hg_status hg_residual_step(hg_residual *self, const hg_real *value, hg_real *r)
 {
     const hg_residual_config *config = self->config;
-    for (uint8_t g = 0U; g < config->width; g++) {
-        self->input[g] = value[config->signal[g]];
-    }
-    if ((HG_REAL_Q31 != 0) && (!hg_linalg_finite(self->input, config->width))) {
+    const uint8_t order = HG_SIZE(HG_ONLY_ORDER, config->order);
+    const uint8_t width = HG_SIZE(HG_ONLY_READ, config->width);
+    const hg_real *input = gathered(self, value, width);
+    if ((HG_REAL_Q31 != 0) && (!hg_linalg_finite(input, width))) {
         return HG_E_NUMERIC; /* of the float types, what is not finite makes every sum below so */
     }
-    hg_linalg_apply(&config->state, self->z, &config->input, self->input, self->next);
-    if (!hg_linalg_finite(self->next, config->order)) {
+    hg_linalg_rows(&config->state, self->z, &config->input, input, self->next, order, order, width);
+    if (!hg_linalg_finite(self->next, order)) {
         return HG_E_NUMERIC; /* once in z, an infinity would make all that follows NaN */
     }
-    hg_linalg_apply(&config->output, self->z, &config->direct, self->input, r);
+    hg_linalg_rows(&config->output, self->z, &config->direct, input, r, HG_SIZE(HG_ONLY_RESIDUALS, config->residuals), order, width);
     hg_real *swap = self->z;
     self->z = self->next;
     self->next = swap;

@@ -15,7 +15,7 @@ from pathlib import Path
 TIMEOUT_S = 300.0
 LIBRARY = "firmware/src/"
 STEP = "hg_detector_step"
-REWIND = "hg_hold_past"
+REWIND = ("hg_hold_past", "hg_hold_rewrite")
 HELPERS = ("linalg", "ring", "code", "trigger")  # modules that count for the part that calls them
 _SECTION = re.compile(r"^ (\S+)?\s+0x([0-9a-f]+)\s+0x([0-9a-f]+)\s+(\S+\.o\)?)$")
 _SYMBOL = re.compile(r"^\s*\d+: ([0-9a-f]+)\s+(\d+|0x[0-9a-f]+) FUNC\s+\S+\s+\S+\s+\S+\s+(\S+)")
@@ -65,9 +65,9 @@ class Call:
         for c in self.calls:
             yield from c.walk()
 
-    def has(self, name: str) -> bool:
-        """Whether a function of this name has been called within."""
-        return any(c.function.name == name for c in self.walk())
+    def has(self, *names: str) -> bool:
+        """Whether a function of one of these names has been called within."""
+        return any(c.function.name in names for c in self.walk())
 
 
 def sections(linker_map: Path) -> list[Section]:

@@ -104,8 +104,8 @@ def spreads(drives: dict[tuple[str, str], list[Call]], targets: Sequence[str], m
     for model in models:
         for t in targets:
             steps = found(drives[t, model], STEP)
-            quiet = [s for s in steps[FULL:] if not s.has(REWIND)]
-            rewinds = [s for s in steps if s.has(REWIND)]
+            quiet = [s for s in steps[FULL:] if not s.has(*REWIND)]
+            rewinds = [s for s in steps if s.has(*REWIND)]
             least, most, spread = least_and_most(quiet)
             body.append((model, t, least, most, spread, str(max(s.all for s in rewinds))))
     return rows(("step of", "target", "least", "most", "spread", "most with a rewind"), body, 2, markdown)
@@ -113,7 +113,7 @@ def spreads(drives: dict[tuple[str, str], list[Call]], targets: Sequence[str], m
 
 def varying(calls: list[Call], markdown: bool) -> list[str]:
     """Which parts depend on the data."""
-    quiet = [parts(s) for s in found(calls, STEP)[FULL:] if not s.has(REWIND)]
+    quiet = [parts(s) for s in found(calls, STEP)[FULL:] if not s.has(*REWIND)]
     names = sorted({n for q in quiet for n in q}, key=lambda n: -sum(q[n] for q in quiet))
     body = [(n, str(min(q[n] for q in quiet)), str(max(q[n] for q in quiet)), str(max(q[n] for q in quiet) - min(q[n] for q in quiet))) for n in names]
     return rows(("part", "least", "most", "differs by"), body, 1, markdown)

@@ -11,12 +11,13 @@ size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(filter-out
 size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
 size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '$(call size_cross,$(1))' $(2) $(call size_elfs,$(1))
 
-.PHONY: size size-quick size-budget
+.PHONY: size size-quick size-step size-budget
 CHECK_PARTS += size-quick
 size: $(call size_elfs,$(TARGETS)) ## flash, RAM and worst-case stack, beside their budget (JSON=1; FORMAT=markdown: of MODEL, short)
 	@$(call size_run,$(TARGETS),$(if $(JSON),--json) $(if $(FORMAT),--format $(FORMAT) --model $(MODEL)))
 size-quick: $(call size_elfs,$(SIZE_QUICK)) ## the same of a few targets
 	@$(call size_run,$(SIZE_QUICK),--quiet)
+size-step: size-step-$(TARGET)-$(MODEL)-$(REAL) ## flash of a detector's step, function by function and table by table (TARGET, MODEL, REAL as for bench-step)
 size-budget: $(call size_elfs,$(TARGETS)) ## take today's sizes for the budget
 	@$(call size_run,$(TARGETS),--write)
 
@@ -28,6 +29,14 @@ $(BENCH)/$(1)-$(2)/$(3)/size_$(4).o: tests/bench/size_$(4).c $(BENCH)/$(3)_recor
 	$$(Q)$$(call bench_model,$(1),$(2),$(3)) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -DRECORD_MODEL='"$(3).c"' -include $(BENCH)/$(3)_record.h -c $$< -o $$@
 $(BENCH)/$(1)-$(2)/$(3)/$(4).elf: $(call bench_objects,$(1)-$(2),$(3)/size_$(4).o $(LIB_SRC:%=$(3)/%) $(if $(filter detector,$(4)),,$(3)/tables.o) $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c) hal/start/image.ld
 	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -Wl,-Map=$$(@:.elf=.map) -nostdlib -o $$@ $$(filter %.o,$$^) -lgcc
+$(if $(filter detector,$(4)),$(eval $(call size_step,$(1),$(2),$(3))))
+endef
+
+# $(call size_step,TARGET,REAL,MODEL)
+define size_step
+.PHONY: size-step-$(1)-$(3)-$(2)
+size-step-$(1)-$(3)-$(2): $(BENCH)/$(1)-$(2)/$(3)/detector.elf
+	@CROSS=$(CROSS_$(1)) $(PY) tests/bench/step_size.py $$<
 endef
 
 define size_target

@@ -17,7 +17,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from counting import Section, rows, sections
-from stack import StackError, compiled, deepest, run_time
+from stack import StackError, compiled, deepest, run_time, symbols
+from step_size import flash
 
 COLUMNS = ("code", "tables", "ram", "stack")
 LOWER_BY = 0.05  # a number that has fallen below its budget by this share, and by
@@ -40,6 +41,7 @@ class Size:
     ram: int
     stack: int
     deepest: tuple[str, ...]  # the calls that take the most stack
+    step: int = 0  # of code and tables, what a step of the detector has (step_size.py); of a detector alone
 
     @property
     def name(self) -> str:
@@ -49,7 +51,7 @@ class Size:
     @property
     def numbers(self) -> dict[str, int]:
         """What is budgeted."""
-        return {c: getattr(self, c) for c in COLUMNS}
+        return {c: getattr(self, c) for c in COLUMNS} | ({"step": self.step} if self.step else {})
 
 
 def kinds(placed: Sequence[Section]) -> tuple[int, int, int]:
@@ -73,12 +75,6 @@ def kinds(placed: Sequence[Section]) -> tuple[int, int, int]:
     return code, tables, ram
 
 
-def symbols(elf: Path, cross: str) -> dict[str, int]:
-    """Addresses of all functions of a program, under all their names."""
-    out = subprocess.run([f"{cross}nm", str(elf)], check=True, capture_output=True, text=True).stdout
-    return {w[2]: int(w[0], 16) & ~1 for w in map(str.split, out.splitlines()) if len(w) == 3 and w[1] in "TtWw"}
-
-
 def stack(elf: Path, cross: str, part: str) -> tuple[int, tuple[str, ...]]:
     """The deepest of all calls that the program makes into the library."""
     sources = {Path(s.source).with_suffix(".ci") for s in sections(elf.with_suffix(".map"))}
@@ -97,7 +93,7 @@ def measure(elf: Path, cross: str) -> Size:
         depth, way = stack(elf, cross, part)
     except StackError as error:
         raise StackError(f"{elf}: {error}") from error
-    return Size(elf.parents[1].name, elf.parent.name, part, code, tables, ram, depth, way)
+    return Size(elf.parents[1].name, elf.parent.name, part, code, tables, ram, depth, way, flash(elf, cross) if part == "detector" else 0)
 
 
 def judged(sizes: Sequence[Size], budget: Budget) -> tuple[list[str], list[str]]:
@@ -109,7 +105,7 @@ def judged(sizes: Sequence[Size], budget: Budget) -> tuple[list[str], list[str]]
             grown.append(f"{s.target} {s.name}: has no budget; see it, then make size-budget")
             continue
         for column, is_ in s.numbers.items():
-            may = allowed[column]
+            may = allowed.get(column, 0)
             if is_ > may:
                 grown.append(f"{s.target} {s.name}: {column} grew from {may} to {is_} bytes, by {is_ - may}")
             elif may - is_ > max(LOWER_BY * may, LOWER_BYTES):
@@ -136,7 +132,7 @@ def versions(crosses: Mapping[str, str]) -> dict[str, str]:
 
 def table(sizes: Sequence[Size]) -> list[str]:
     """A row a program."""
-    body = [(s.target, s.model, s.part, *(str(n) for n in s.numbers.values())) for s in sizes]
+    body = [(s.target, s.model, s.part, *(str(s.numbers[c]) for c in COLUMNS)) for s in sizes]
     return rows(("target", "model", "part", "code", "tables", "RAM", "stack"), body, 3, False)
 
 
@@ -144,7 +140,7 @@ def short(sizes: Sequence[Size], model: str) -> list[str]:
     """Markdown of one model: a row a target, a column a program."""
     mine = {(s.target, s.part): s for s in sizes if s.model == model}
     targets, programs = list(dict.fromkeys(t for t, _ in mine)), list(dict.fromkeys(p for _, p in mine))
-    body = [(t, *(" / ".join(str(n) for n in mine[t, p].numbers.values()) for p in programs)) for t in targets]
+    body = [(t, *(" / ".join(str(mine[t, p].numbers[c]) for c in COLUMNS) for p in programs)) for t in targets]
     return rows((f"{model}: code / tables / RAM / stack, bytes", *programs), body, 1, True)
 
 

@@ -25,7 +25,7 @@ static struct {
     hg_acc      sum[RECORD_SUMS];
 #endif
     hg_alarm    alarm[RECORD_GENERATORS + RECORD_BANKS];
-    int32_t     code[2U * RECORD_SIGNALS];
+    int32_t     code[HG_HOLD_CODES(RECORD_SIGNALS)];
     hg_real     real[RECORD_REALS];
 } all;
 
@@ -49,7 +49,7 @@ static const hg_detector_memory memory = {
 #endif
     .alarm = all.alarm,
     .code = all.code,
-    .codes = 2U * RECORD_SIGNALS,
+    .codes = HG_HOLD_CODES(RECORD_SIGNALS),
     .real = all.real,
     .reals = RECORD_REALS,
 };

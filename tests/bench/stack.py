@@ -109,6 +109,12 @@ def disassembled(listing: str, at: Mapping[int, str]) -> dict[str, Node]:
     return made
 
 
+def symbols(elf: Path, cross: str) -> dict[str, int]:
+    """Addresses of all functions of a program, under all their names."""
+    out = subprocess.run([f"{cross}nm", str(elf)], check=True, capture_output=True, text=True).stdout
+    return {w[2]: int(w[0], 16) & ~1 for w in map(str.split, out.splitlines()) if len(w) == 3 and w[1] in "TtWw"}
+
+
 def run_time(elf: Path, cross: str, names: Mapping[str, int]) -> dict[str, Node]:
     """The functions of a program by disassembly, under each of their names."""
     listing = subprocess.run([f"{cross}objdump", "-d", "--no-show-raw-insn", str(elf)], check=True, capture_output=True, text=True).stdout

@@ -25,9 +25,9 @@ def show(steps: list[Call]) -> None:
     spent = [parts(s) for s in steps]
     print(f"{'instructions a step':<34} {'least':>8} {'most':>8} {'mean':>10}   share")
     print(row(STEP, [s.all for s in steps], whole))
-    quiet = [s.all for s in steps if not s.has(REWIND)]
+    quiet = [s.all for s in steps if not s.has(*REWIND)]
     print(row(f"  of {len(quiet)} without a rewind", quiet, whole))
-    rewinds = [s.all for s in steps if s.has(REWIND)]
+    rewinds = [s.all for s in steps if s.has(*REWIND)]
     if rewinds:
         print(row(f"  of {len(rewinds)} with one", rewinds, whole))
     print()

@@ -13,8 +13,8 @@ import pytest
 from counting import STEP, Call, Function, count, found, functions, of_library, rows, sections, tree
 from filters import POLYNOMIAL, fusion, polynomial
 from needs import needs
-from size import Size, judged, symbols, versions, written
-from stack import StackError, compiled, deepest, disassembled, registers, run_time
+from size import Size, judged, versions, written
+from stack import StackError, compiled, deepest, disassembled, registers, run_time, symbols
 
 from hullguard.design.cost import costs
 from hullguard.design.design import design

@@ -208,9 +208,9 @@ def test_no_held_value_brings_a_residual_over_its_threshold_after_a_lost_frame_h
 
 # ---- libraries that are wrong on purpose ----
 
-NO_SILENCE = {"hold.c": [("held && (!self->lost) && (self->age > self->silence)", "held && (!self->lost) && (self->silence < 255U)")]}
-NO_REWRITING = {"detector.c": [("hg_hold_past(&self->memory.hold[group], lag, &row[first]);", "(void)first;")]}
-NO_REWIND = {"hold.c": [("*rewind = (newly_lost || (self->fresh && self->gap)) ? (uint8_t)(self->gap_age - 1U) : 0U;", "*rewind = 0U; (void)newly_lost;")]}
+NO_SILENCE = {"hold.c": [("(!lost) && (age > self->silence)", "(!lost) && (!fresh)")]}
+NO_REWRITING = {"detector.c": [("hg_hold_rewrite(&self->memory.hold[group], &self->radii, first, lags);", "(void)first;")]}
+NO_REWIND = {"hold.c": [("*rewind = (newly_lost || self->gap) ? (uint8_t)(self->gap_age - 1U) : 0U;", "*rewind = 0U;")]}
 NO_CANCEL = {"decision.c": [("((alarm->pending & evidence->rewound) != 0U)", "false")]}
 SMALL_J = {
     "hull.c": [

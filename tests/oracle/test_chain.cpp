@@ -226,6 +226,7 @@ class Link {
 public:
     Link(Random &random, const Group &group, int quiet_from)
         : random_(random), group_(group), quiet_from_(quiet_from), hold_(group.model), sender_memory_(group.width() + 1), memory_(HG_HOLD_CODES(group.width()) + 1),
+          reals_(HG_HOLD_REALS(group.width()) + 1),
           y_(group.width()), loss_(random.chance(0.3) ? 0.0 : random.real(0.0, 0.5)), known_(random.real(0.0, 1.0)),
           spurious_(random.chance(0.7) ? 0.0 : 0.03), vanish_(random.chance(0.7) ? 0.0 : 0.03), longest_outage_(random.chance(0.2) ? 200 : 12)
     {
@@ -248,6 +249,7 @@ private:
     hg_trigger                trigger_{};
     hg_hold                   self_{};
     std::vector<std::int32_t> sender_memory_, memory_;
+    std::vector<hg_real>      reals_;
     std::vector<double>       y_;
     oracle::Table             truth_, value_, radius_; /* [sample][channel]; the library's, rewritten as it says */
     double                    loss_, known_, spurious_, vanish_;
@@ -376,7 +378,7 @@ std::string Link::run(int samples)
 {
     std::string failure;
     if (hg_trigger_start(&trigger_, &group_.trigger, sender_memory_.data()) != HG_OK) { return "sender refused"; }
-    if (hg_hold_start(&self_, &group_.hold, memory_.data()) != HG_OK) { return "hold refused"; }
+    if (hg_hold_start(&self_, &group_.hold, memory_.data(), reals_.data()) != HG_OK) { return "hold refused"; }
     for (int k = 0; k < samples && failure.empty(); ++k) {
         walk();
         failure = exchange(k);

@@ -21,7 +21,7 @@
 #define HISTORY 6U
 #define TAPS 5U
 #define SETTLE 6U
-#define REALS ((2U * WIDTH) + (2U * 3U) + (WIDTH * HISTORY) + (SM_SIGNALS * WINDOW) + 4U + 3U + 7U + 2U)
+#define REALS ((2U * WIDTH) + HG_HOLD_REALS(SM_SIGNALS) + (2U * 3U) + (WIDTH * HISTORY) + (SM_SIGNALS * WINDOW) + 4U + 3U + 7U + 2U)
 #define SUMS (2U * CERTIFICATES)
 #define TINY 0.000244140625
 #define DRIFT (0.0078125 + 0.03125 + 0.015625 + (0.25 * SM_HALF)) /* of the prediction in a sample */
@@ -92,7 +92,7 @@ static const hg_detector_config alone = {
     .mismatch = &mismatch, .generators = 0U, .residual = NULL, .hull = NULL, .banks = 1U, .bank = bank_alone,
     .decision = {.generators = 1U, .feeds = &feeds[2], .faults = &faults[2], .up = 1U, .down = 3U, .latch = false},
     .history = WINDOW, .window = WINDOW, .residuals = 1U, .codes = SM_CODES,
-    .reals = (2U * 4U) + 2U + (4U * WINDOW) + (SM_SIGNALS * WINDOW), .sums = SUMS};
+    .reals = (2U * 4U) + 2U + HG_HOLD_REALS(SM_SIGNALS) + (4U * WINDOW) + (SM_SIGNALS * WINDOW), .sums = SUMS};
 
 typedef struct {
     hg_hold     hold[SM_GROUPS];

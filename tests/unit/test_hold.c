@@ -9,6 +9,8 @@
 #define INTERVAL 5U
 #define MARGIN 3U
 #define HORIZON (INTERVAL + MARGIN)
+#define RING_WIDTH (WIDTH + 2U)
+#define RING_LENGTH (INTERVAL + 1U)
 #define STEP 6 /* codes that a channel moves at most in one sample */
 
 static const uint8_t silence_table[LEVELS] = {2U, 1U};
@@ -56,7 +58,8 @@ static hg_real slew(uint32_t j, size_t g)
 
 typedef struct {
     hg_hold hold;
-    int32_t codes[(3U * WIDTH) + 1U];
+    int32_t codes[HG_HOLD_CODES(WIDTH) + 1U];
+    hg_real reals[HG_HOLD_REALS(WIDTH) + 1U];
     hg_real value[WIDTH + 1U];
     hg_real radius[WIDTH + 1U];
     uint8_t rewind;
@@ -65,10 +68,38 @@ typedef struct {
 static void begin(rig *r)
 {
     (void)memset(r, 0x5A, sizeof(*r));
-    arm_codes(r->codes, (3U * WIDTH) + 1U);
+    arm_codes(r->codes, HG_HOLD_CODES(WIDTH) + 1U);
+    arm(r->reals, HG_HOLD_REALS(WIDTH) + 1U);
     arm(r->value, WIDTH + 1U);
     arm(r->radius, WIDTH + 1U);
-    assert_status(HG_OK, hg_hold_start(&r->hold, &usual, r->codes));
+    assert_status(HG_OK, hg_hold_start(&r->hold, &usual, r->codes, r->reals));
+}
+
+/* The past in a ring is rewritten as it is row by row; nothing else of the ring changes, wherever its newest row is. */
+static void check_rewrite(const rig *r)
+{
+    hg_real memory[RING_WIDTH * RING_LENGTH];
+    hg_ring ring;
+    for (uint8_t newest = 0U; newest < RING_LENGTH; newest++) {
+        assert_status(HG_OK, hg_ring_start(&ring, RING_WIDTH, RING_LENGTH, memory));
+        arm(memory, COUNT(memory));
+        ring.newest = newest;
+        for (uint8_t lag = 1U; lag <= r->rewind; lag++) { /* without a value it had the radius of the range */
+            (void)memcpy(&hg_ring_row(&ring, lag)[1], span_table, sizeof(span_table));
+        }
+        hg_hold_rewrite(&r->hold, &ring, 1U, r->rewind);
+        for (uint8_t lag = 0U; lag < RING_LENGTH; lag++) {
+            const hg_real *row = hg_ring_row(&ring, lag);
+            hg_real past[WIDTH];
+            arm(past, WIDTH);
+            if ((lag >= 1U) && (lag <= r->rewind)) {
+                hg_hold_past(&r->hold, lag, past);
+            }
+            assert_memory_equal(past, &row[1], sizeof(past));
+            assert_untouched(&row[0], 1U);
+            assert_untouched(&row[WIDTH + 1U], 1U);
+        }
+    }
 }
 
 static void step(rig *r)
@@ -82,7 +113,11 @@ static void step(rig *r)
     }
     assert_untouched(&r->value[WIDTH], 1U);
     assert_untouched(&r->radius[WIDTH], 1U);
-    assert_codes_untouched(&r->codes[3U * WIDTH], 1U);
+    assert_codes_untouched(&r->codes[HG_HOLD_CODES(WIDTH)], 1U);
+    assert_untouched(&r->reals[HG_HOLD_REALS(WIDTH)], 1U);
+    if (r->rewind > 0U) {
+        check_rewrite(r);
+    }
 }
 
 static void frame(rig *r, int32_t a, int32_t b, bool continues)
@@ -96,48 +131,53 @@ static void start_tells_null_and_bad_tables(void **state)
 {
     (void)state;
     hg_hold self;
-    int32_t codes[3U * WIDTH];
-    arm_codes(codes, 3U * WIDTH);
-    assert_status(HG_E_ARGUMENT, hg_hold_start(NULL, &usual, codes));
-    assert_status(HG_E_ARGUMENT, hg_hold_start(&self, NULL, codes));
-    assert_status(HG_E_ARGUMENT, hg_hold_start(&self, &usual, NULL));
+    int32_t codes[HG_HOLD_CODES(WIDTH)];
+    hg_real reals[HG_HOLD_REALS(WIDTH)];
+    arm_codes(codes, COUNT(codes));
+    arm(reals, COUNT(reals));
+    assert_status(HG_E_ARGUMENT, hg_hold_start(NULL, &usual, codes, reals));
+    assert_status(HG_E_ARGUMENT, hg_hold_start(&self, NULL, codes, reals));
+    assert_status(HG_E_ARGUMENT, hg_hold_start(&self, &usual, NULL, reals));
+    assert_status(HG_E_ARGUMENT, hg_hold_start(&self, &usual, codes, NULL));
     hg_hold_config c = usual;
     c.trigger = NULL;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     hg_trigger_config t = trigger;
     t.levels = 0U;
     c = usual, c.trigger = &t;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     c = usual, c.margin = (uint8_t)(255U - INTERVAL);
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     c = usual, c.scale = NULL;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     c = usual, c.half = NULL;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     c = usual, c.slew = NULL;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     c = usual, c.span = NULL;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
     c = usual, c.middle = NULL;
-    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
-    assert_codes_untouched(codes, 3U * WIDTH);
+    assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
+    assert_codes_untouched(codes, COUNT(codes));
+    assert_untouched(reals, COUNT(reals));
     static hg_real long_slew[254U * WIDTH];
     c = usual, c.slew = long_slew, c.margin = (uint8_t)(254U - INTERVAL);
-    assert_status(HG_OK, hg_hold_start(&self, &c, codes));
+    assert_status(HG_OK, hg_hold_start(&self, &c, codes, reals));
 }
 
 static void start_tells_a_scale_of_the_other_number_type(void **state)
 {
     (void)state;
     hg_hold self;
-    int32_t codes[3U * WIDTH];
+    int32_t codes[HG_HOLD_CODES(WIDTH)];
+    hg_real reals[HG_HOLD_REALS(WIDTH)];
     for (int exponent = INT8_MIN; exponent <= INT8_MAX; exponent++) {
         for (size_t g = 0U; g < WIDTH; g++) {
             hg_code_scale scale[WIDTH] = {scale_table[0], scale_table[1]};
             hg_hold_config c = usual;
             c.scale = scale;
             scale[g].exponent = (int8_t)exponent;
-            assert_status((exponent == 0) ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+            assert_status((exponent == 0) ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
         }
     }
 }
@@ -148,8 +188,10 @@ static void start_tells_numbers_that_are_no_radii(void **state)
     (void)state;
     const hg_real bad[] = {REAL_NAN, REAL_INF, -REAL_INF, R(-0.125)};
     hg_hold self;
-    int32_t codes[3U * WIDTH];
-    arm_codes(codes, 3U * WIDTH);
+    int32_t codes[HG_HOLD_CODES(WIDTH)];
+    hg_real reals[HG_HOLD_REALS(WIDTH)];
+    arm_codes(codes, COUNT(codes));
+    arm(reals, COUNT(reals));
     for (size_t place = 0U; place < ((2U + HORIZON) * WIDTH); place++) {
         for (size_t i = 0U; i < COUNT(bad); i++) {
             hg_real table[(2U + HORIZON) * WIDTH];
@@ -161,10 +203,11 @@ static void start_tells_numbers_that_are_no_radii(void **state)
             c.span = &table[WIDTH];
             c.slew = &table[2U * WIDTH];
             table[place] = bad[i];
-            assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes));
+            assert_status(HG_E_CONFIG, hg_hold_start(&self, &c, codes, reals));
         }
     }
-    assert_codes_untouched(codes, 3U * WIDTH);
+    assert_codes_untouched(codes, COUNT(codes));
+    assert_untouched(reals, COUNT(reals));
 }
 
 static void before_the_first_frame_nothing_is_known(void **state)
@@ -255,10 +298,11 @@ static void while_the_level_is_unknown_the_widest_counts(void **state)
     const double widest[3] = {4.0, 2.0, 1.0};
     hg_hold self;
     int32_t codes[HG_HOLD_CODES(1U)];
+    hg_real reals[HG_HOLD_REALS(1U)];
     hg_real value;
     hg_real radius;
     uint8_t rewind;
-    assert_status(HG_OK, hg_hold_start(&self, &c, codes));
+    assert_status(HG_OK, hg_hold_start(&self, &c, codes, reals));
     for (size_t i = 0U; i < 3U; i++) { /* one frame, level unknown; then level 0; then level 1 */
         assert_status(HG_OK, hg_hold_receive(&self, &codes_sent[i], true));
         hg_hold_step(&self, &value, &radius, &rewind);
@@ -279,7 +323,7 @@ static void doubt_stays_until_it_is_settled(void **state)
     c.slew = falling;
     rig r;
     begin(&r);
-    assert_status(HG_OK, hg_hold_start(&r.hold, &c, r.codes));
+    assert_status(HG_OK, hg_hold_start(&r.hold, &c, r.codes, r.reals));
     frame(&r, 0, 0, true);
     step(&r);
     step(&r);
@@ -300,11 +344,14 @@ static void a_second_frame_of_one_sample_is_refused(void **state)
     const int32_t second[WIDTH] = {3, 4};
     assert_status(HG_OK, hg_hold_receive(&r.hold, first, true));
     const hg_hold before = r.hold;
-    int32_t codes[3U * WIDTH];
+    int32_t codes[HG_HOLD_CODES(WIDTH)];
+    hg_real reals[HG_HOLD_REALS(WIDTH)];
     (void)memcpy(codes, r.codes, sizeof(codes));
+    (void)memcpy(reals, r.reals, sizeof(reals));
     assert_status(HG_E_REPEATED, hg_hold_receive(&r.hold, second, true));
     assert_memory_equal(&before, &r.hold, sizeof(before));
     assert_memory_equal(codes, r.codes, sizeof(codes));
+    assert_memory_equal(reals, r.reals, sizeof(reals));
     step(&r);
     assert_real(0.25, r.value[0]);
 }
@@ -489,7 +536,7 @@ static void a_group_without_signals_only_tells_its_health(void **state)
     int32_t codes = CANARY_CODE;
     hg_real none = CANARY;
     uint8_t rewind = 0U;
-    assert_status(HG_OK, hg_hold_start(&self, &c, &codes));
+    assert_status(HG_OK, hg_hold_start(&self, &c, &codes, &none));
     for (int k = 0; k < 20; k++) {
         assert_status(HG_OK, hg_hold_receive(&self, &codes, true));
         hg_hold_step(&self, &none, &none, &rewind);

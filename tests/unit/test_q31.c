@@ -485,10 +485,11 @@ static void a_hold_knows_values_and_radii_to_the_step(void **state)
         const hg_hold_config config = {.trigger = &trigger, .margin = MARGIN, .scale = &scale, .half = &half, .slew = slew, .span = &span, .middle = &middle};
         hg_hold self;
         int32_t codes[HG_HOLD_CODES(1U)];
+        hg_real reals[HG_HOLD_REALS(1U)];
         hg_real value;
         hg_real radius;
         uint8_t rewind;
-        assert_status(HG_OK, hg_hold_start(&self, &config, codes));
+        assert_status(HG_OK, hg_hold_start(&self, &config, codes, reals));
         hg_hold_step(&self, &value, &radius, &rewind);
         assert_int_equal(middle, value);
         assert_int_equal(span, radius);
@@ -530,7 +531,8 @@ static void scales_with_an_exponent_out_of_range_are_refused(void **state)
         const bool valid = (exponent >= -40) && (exponent <= 0);
         hg_hold self;
         int32_t codes[HG_HOLD_CODES(1U)];
-        assert_int_equal(valid ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &config, codes));
+        hg_real reals[HG_HOLD_REALS(1U)];
+        assert_int_equal(valid ? HG_OK : HG_E_CONFIG, hg_hold_start(&self, &config, codes, reals));
         assert_int_equal(valid, hg_frame_valid(&message));
     }
 }

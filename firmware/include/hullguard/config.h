@@ -36,6 +36,9 @@
 #ifndef HG_WITH_MISMATCH
 #define HG_WITH_MISMATCH 1
 #endif
+#ifndef HG_WITH_MODES
+#define HG_WITH_MODES 1 /* of a hull (hull.h) */
+#endif
 #if HG_REAL_Q31 && HG_WITH_ZONOTOPE
 #error "the zonotope is for the float types: a model for HG_REAL_Q31 has its threshold by the hull"
 #endif
@@ -71,6 +74,42 @@
 #if (HG_GENERATORS_MAX < 1U) || (HG_GENERATORS_MAX > 32U)
 #error "HG_GENERATORS_MAX: 1 .. 32"
 #endif
+
+/* Sizes that are the same in all tables of the one model that a library is built for: the compiler then knows how often each loop runs, and a
+   model of another size is refused at its start. 0: as the tables say. */
+#ifndef HG_ONLY_GROUPS
+#define HG_ONLY_GROUPS 0U
+#endif
+#ifndef HG_ONLY_GROUP_SIGNALS
+#define HG_ONLY_GROUP_SIGNALS 0U /* of each group */
+#endif
+#ifndef HG_ONLY_WIDTH
+#define HG_ONLY_WIDTH 0U /* of the signal vector, sent and derived */
+#endif
+#ifndef HG_ONLY_HISTORY
+#define HG_ONLY_HISTORY 0U /* rows of the ring of radii */
+#endif
+#ifndef HG_ONLY_GENERATORS
+#define HG_ONLY_GENERATORS 0U
+#endif
+#ifndef HG_ONLY_JUDGED
+#define HG_ONLY_JUDGED 0U /* generators and banks */
+#endif
+#ifndef HG_ONLY_ORDER
+#define HG_ONLY_ORDER 0U /* of each generator */
+#endif
+#ifndef HG_ONLY_RESIDUALS
+#define HG_ONLY_RESIDUALS 0U /* of each generator */
+#endif
+#ifndef HG_ONLY_READ
+#define HG_ONLY_READ 0U /* signals that each generator reads, and its threshold */
+#endif
+#ifndef HG_ONLY_IN_ORDER
+#define HG_ONLY_IN_ORDER 0U /* 1: each generator reads the whole signal vector in its order, and so does its threshold */
+#endif
+/* A size by its option and its place in a table; and does the one fit the other? */
+#define HG_SIZE(only, entry) (((only) != 0U) ? (uint8_t)(only) : (entry))
+#define HG_SIZE_FITS(only, entry) (((only) == 0U) || ((entry) == (only)))
 
 /* States of a fusion filter. Memory and time grow with the square and the cube of the number in use, not with this bound. */
 #ifndef HG_FUSION_STATES_MAX

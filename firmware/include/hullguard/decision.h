@@ -64,7 +64,15 @@ typedef struct {            /* what one sample brings */
 } hg_evidence;
 
 /** Is any |r_i| > J_i? NaN in r or J counts as yes. Cost: n comparisons. */
-bool hg_decision_exceeds(const hg_real *r, const hg_real *J, uint8_t n);
+static inline bool hg_decision_exceeds(const hg_real *r, const hg_real *J, uint8_t n)
+{
+    bool exceeds = false;
+    for (uint8_t i = 0U; i < n; i++) {
+        const bool outside = !(hg_real_abs(r[i]) <= J[i]); /* written so that NaN is an alarm, never blindness */
+        exceeds = exceeds || outside;
+    }
+    return exceeds;
+}
 
 /** Begin with no alarm.
  *  @param[in] alarm  [generators] memory, owned by the caller

@@ -16,6 +16,7 @@
 
 #include "hullguard/code.h"
 #include "hullguard/real.h"
+#include "hullguard/ring.h"
 #include "hullguard/status.h"
 #include "hullguard/trigger.h"
 
@@ -48,7 +49,8 @@ typedef struct {               /* RAM: one a group */
     const hg_hold_config *config;
     int32_t              *sent;      /* [width] codes of the last good frame */
     int32_t              *previous;  /* [width] codes of the one before */
-    int32_t              *promise;   /* [width] how far the sender's may be from them while it is silent, codes */
+    hg_real              *value;     /* [width] of the last good frame, signal units */
+    hg_real              *promise;   /* [width] its radius while the sender, who must not be silent beyond it, is silent */
     uint8_t               age;       /* samples since the last good frame, saturated */
     uint8_t               good;      /* good frames in a row: 0 none yet, 1, or 2 */
     uint8_t               level;     /* of the trigger, known when good is 2 */
@@ -63,23 +65,25 @@ typedef struct {               /* RAM: one a group */
     uint8_t               gap_age;   /* age of the good frame before the gap, samples */
 } hg_hold;
 
-/** Memory of one group, integers. */
-#define HG_HOLD_CODES(width) (3U * (uint32_t)(width))
+/** Memory of one group, integers and numbers. */
+#define HG_HOLD_CODES(width) (2U * (uint32_t)(width))
+#define HG_HOLD_REALS(width) (2U * (uint32_t)(width))
 
 /** Begin before the first sample: nothing known, radius = span.
  *  @param[in] codes  [HG_HOLD_CODES(width)] memory, owned by the caller
+ *  @param[in] reals  [HG_HOLD_REALS(width)] the same
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
  *  @retval HG_E_CONFIG    the trigger's tables are not valid, one of the group's is missing, holds no radius or a scale's
  *                         exponent that is not valid, or interval_max + margin does not fit */
-hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes);
+hg_status hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes, hg_real *reals);
 
 /** Take a good frame of the open sample (the one that the next hg_hold_step() will take).
  *  @param[in] code       [width] codes as sent; HG_CODE_INVALID where the sender had no value
  *  @param[in] continues  did the frame's sequence counter continue the last good frame's?
  *  @retval HG_OK          booked
  *  @retval HG_E_REPEATED  the sample already has a frame; nothing changed
- *  Cost: width x 2 copies and, for each level it may be on, a multiplication. */
+ *  Cost: width x 2 copies, 2 multiplications and, for each level it may be on, one more: a sample without a frame has none. */
 hg_status hg_hold_receive(hg_hold *self, const int32_t *code, bool continues);
 
 /** A frame of this group is known to be lost: it came damaged, early, late or refused. From now on only the slew is trusted. */
@@ -89,13 +93,18 @@ void hg_hold_lose(hg_hold *self);
  *  @param[out] value   [width] signal units, finite
  *  @param[out] radius  [width] signal units, finite, >= 0
  *  @param[out] rewind  number of past samples, this one not counted, whose radii hg_hold_past() now corrects; 0 nearly always
- *  Cost: width x 3 multiplications. */
+ *  Cost: width comparisons; the same with a frame, without one, and after a loss. */
 void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewind);
 
 /** Radii of a past sample in the light of a loss; to be called after a step that asked for it, for lag = 1 .. rewind.
  *  @param[in]  lag     samples before the one just stepped
  *  @param[out] radius  [width] */
 void hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius);
+
+/** The same for lag = 1 .. lags, in the ring of radii that thresholds read: this group's signals stand in its rows from place `first` on.
+ *  @param[in] lags  at most rewind and ring length - 1
+ *  Cost: lags x width copies. */
+void hg_hold_rewrite(const hg_hold *self, hg_ring *ring, uint8_t first, uint8_t lags);
 
 /** Does a radius since the last good frame rely on the sender's silence? */
 static inline bool hg_hold_doubt(const hg_hold *self)

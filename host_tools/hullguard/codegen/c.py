@@ -152,24 +152,52 @@ def limits(tables: Tables) -> tuple[tuple[str, int], ...]:
     return tuple((macro, max(least, 1)) for macro, least in needed)
 
 
-def parts(tables: Tables) -> tuple[tuple[str, bool], ...]:
+def parts(design: Design) -> tuple[tuple[str, bool], ...]:
     """Options of config.h that leave a part out, and whether this model needs it."""
-    used = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch))
+    tables = design.tables
+    modal = bool(design.uios) or any(isinstance(g, ModalGeneratorTable) for g in tables.generators)
+    used = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch), ("MODES", modal))
     return tuple((f"HG_WITH_{part}", bool(there)) for part, there in used)
 
 
-def _limits(tables: Tables) -> list[str]:
+def only(design: Design) -> tuple[tuple[str, int], ...]:
+    """Options of config.h for a size that is the same in all tables of a model; 0 where it is not."""
+    tables = design.tables
+    # An unknown-input observer has tables of the same kinds beside those of the detector.
+    generators = () if design.uios else tables.generators
+    sizes: tuple[tuple[str, set[int]], ...] = (
+        ("GROUPS", {len(tables.groups)}),
+        ("GROUP_SIGNALS", {len(g.signals) for g in tables.groups}),
+        ("WIDTH", {tables.width}),
+        ("HISTORY", {tables.history}),
+        ("GENERATORS", {len(tables.generators)}),
+        ("JUDGED", {tables.judged}),
+        ("ORDER", {len(g.state) for g in generators}),
+        ("RESIDUALS", {len(g.output) for g in generators}),
+        ("IN_ORDER", {int(signals == tuple(range(tables.width))) for g in generators for signals in (g.signal, g.wide)}),
+        ("READ", {len(signals) for g in generators for signals in (g.signal, g.wide)}),
+    )
+    return tuple((f"HG_ONLY_{size}", found.pop() if len(found) == 1 else 0) for size, found in sizes)
+
+
+def _limits(design: Design) -> list[str]:
+    tables = design.tables
     lines = []
     for macro, least in limits(tables):
         if least > 1:
             lines += [f"#if {macro} < {least}U", f'#error "model {tables.name} needs {macro} of at least {least}"', "#endif"]
-    for macro, used in parts(tables):
+    for macro, used in parts(design):
         if used:
             lines += [f"#if !{macro}", f'#error "model {tables.name} needs {macro}"', "#endif"]
+    for macro, size in only(design):
+        if size > 0:
+            lines += [f"#if ({macro} != 0U) && ({macro} != {size}U)", f'#error "model {tables.name} needs {macro} of {size}, or 0"', "#endif"]
+        else:
+            lines += [f"#if {macro} != 0U", f'#error "model {tables.name} needs {macro} of 0"', "#endif"]
     if tables.fixed is None:
         reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
         lines += ["#if HG_REAL_Q31", *" \\\n       ".join(textwrap.wrap(f'#error "{reason}"', WIDTH - 9, break_long_words=False)).splitlines(), "#endif"]
-    return [*lines, ""] if lines else []
+    return [*lines, ""]
 
 
 def zonotopes(tables: Tables) -> list[ZonotopeTable]:
@@ -253,7 +281,7 @@ def _header(design: Design, names: Names) -> str:
         "",
         '#include "hullguard/node.h"',
         "",
-        *_limits(tables),
+        *_limits(design),
         "#ifdef __cplusplus",
         'extern "C" {',
         "#endif",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hullguard.codegen.c import banner, limits, parts
+from hullguard.codegen.c import banner, limits, only, parts
 from hullguard.design.design import Design
 
 
@@ -16,7 +16,8 @@ def emit_config(design: Design) -> str:
         f"#define {guard}",
         "",
         *(f"#define {macro} {least}U" for macro, least in limits(tables)),
-        *(f"#define {macro} {int(used)}" for macro, used in parts(tables)),
+        *(f"#define {macro} {int(used)}" for macro, used in parts(design)),
+        *(f"#define {macro} {size}U" for macro, size in only(design)),
         "",
         "#endif",
     ]

@@ -238,12 +238,12 @@ class Tables:
         own += sum(len(g.output) if g.zonotope is None else g.zonotope.reals for g in self.generators)
         own += sum(len(g.mode_decay) for g in self.generators if isinstance(g, ModalGeneratorTable))
         own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
-        return 2 * self.width + 2 * self.residuals + self.width * self.history + self.signals * self.window + own
+        return 2 * self.width + 2 * self.residuals + 2 * self.signals + self.width * self.history + self.signals * self.window + own
 
     @property
     def codes(self) -> int:
         """HG_HOLD_CODES of all groups."""
-        return 3 * self.signals
+        return 2 * self.signals
 
     @property
     def sums(self) -> int:
