@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from hullguard.codegen.c import emit_c, limits, parts
+from hullguard.codegen.c import emit_c, limits, only, parts
 from hullguard.codegen.uio import emit_uio
 from hullguard.commands import emit, make_folder, progress, say
 from hullguard.design.design import Design, design
@@ -62,8 +62,10 @@ def _options(designs: Sequence[Design]) -> Iterable[str]:
     """The options of config.h with which the library has what these models need and no more."""
     most: dict[str, int] = {}
     for made in designs:
-        for macro, least in (*limits(made.tables), *((macro, int(used)) for macro, used in parts(made.tables))):
+        for macro, least in (*limits(made.tables), *((macro, int(used)) for macro, used in parts(made))):
             most[macro] = max(most.get(macro, 0), least)
+    sizes = [dict(only(made)) for made in designs]
+    most |= {macro: size if all(other[macro] == size for other in sizes) else 0 for macro, size in sizes[0].items()}
     yield "/* What these models need of the library. */"
     for macro, value in most.items():
         yield f"#define {macro} {value}{'' if macro.startswith('HG_WITH_') else 'U'}"
