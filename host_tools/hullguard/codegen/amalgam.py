@@ -61,17 +61,14 @@ def amalgamate(designs: Sequence[Design], firmware: Path = FIRMWARE) -> tuple[st
 def _options(designs: Sequence[Design]) -> Iterable[str]:
     """The options of config.h with which the library has what these models need and no more."""
     most: dict[str, int] = {}
-    same: dict[str, set[int]] = {}
     for made in designs:
         for macro, least in (*limits(made.tables), *((macro, int(used)) for macro, used in parts(made))):
             most[macro] = max(most.get(macro, 0), least)
-        for macro, size in only(made):
-            same.setdefault(macro, set()).add(size)
+    sizes = [dict(only(made)) for made in designs]
+    most |= {macro: size if all(other[macro] == size for other in sizes) else 0 for macro, size in sizes[0].items()}
     yield "/* What these models need of the library. */"
     for macro, value in most.items():
         yield f"#define {macro} {value}{'' if macro.startswith('HG_WITH_') else 'U'}"
-    for macro, sizes in same.items():
-        yield f"#define {macro} {sizes.pop() if len(sizes) == 1 else 0}U"
 
 
 def _plain(text: str) -> str:
