@@ -514,7 +514,7 @@ static uint8_t clipped(uint32_t count)
     return (count > UINT8_MAX) ? UINT8_MAX : (uint8_t)count;
 }
 
-void hg_status_write(const hg_message *message, const hg_verdict *verdict, uint32_t lost, uint32_t refused, uint8_t counter, hg_can_frame *frame)
+void hg_status_write(const hg_message *message, const hg_verdict *verdict, uint32_t lost, uint32_t refusals, uint8_t counter, hg_can_frame *frame)
 {
     *frame = blank(message);
     frame->data[2] = (uint8_t)(verdict->model_hash & 0xFFU);
@@ -522,7 +522,7 @@ void hg_status_write(const hg_message *message, const hg_verdict *verdict, uint3
     frame->data[4] = (uint8_t)((verdict->model_hash >> 16U) & 0xFFU);
     frame->data[5] = (uint8_t)((verdict->model_hash >> 24U) & 0xFFU);
     frame->data[6] = clipped(lost);
-    frame->data[7] = clipped(refused);
+    frame->data[7] = clipped(refusals);
     (void)hg_e2e_protect(message->e2e, frame->data, frame->length, counter, (uint8_t)(verdict->k & STAMP_MASK));
 }
 

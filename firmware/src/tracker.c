@@ -12,18 +12,18 @@
 #define FNV_PRIME 0x01000193U
 #define TURNS_MAX HG_REAL_C(32767.0) /* periods that a value which wraps can be away from 0 */
 
-static void raise16(uint16_t *counter, uint32_t by)
+static void add16(uint16_t *counter, uint32_t by)
 {
     const uint32_t room = UINT16_MAX - (uint32_t)*counter;
     *counter = (uint16_t)(*counter + ((by < room) ? by : room));
 }
 
-static void raise32(uint32_t *counter)
+static void add32(uint32_t *counter)
 {
     *counter += (*counter < UINT32_MAX) ? 1U : 0U;
 }
 
-static uint16_t bit(uint8_t i)
+static uint16_t mark(uint8_t i)
 {
     return (uint16_t)(1UL << i);
 }
@@ -41,7 +41,7 @@ static bool linked(const hg_message *message, uint16_t modulus, uint8_t width)
            (message->e2e->ignore == 0U) && (hg_e2e_modulus(message->e2e) == modulus);
 }
 
-static bool config_valid(const hg_tracker_config *config)
+static bool all_valid(const hg_tracker_config *config)
 {
     bool valid = (config->fusion != NULL) && (config->source != NULL) && (config->estimate != NULL) && (config->heartbeat >= 1U) && (config->interval >= 1U);
     valid = valid && hg_fusion_valid(config->fusion) && (config->fusion->inputs == 0U) && hg_report_valid(config->verdict, config->status);
@@ -74,7 +74,7 @@ hg_status hg_tracker_start(hg_tracker *self, const hg_tracker_config *config, co
     if ((self == NULL) || (config == NULL) || (memory == NULL) || (memory->link == NULL) || (memory->real == NULL)) {
         return HG_E_ARGUMENT;
     }
-    if (!config_valid(config)) {
+    if (!all_valid(config)) {
         return HG_E_CONFIG;
     }
     *self = (hg_tracker){.config = config, .link = memory->link, .value = memory->real, .deviation = &memory->real[config->fusion->states],
@@ -106,7 +106,7 @@ static uint8_t link_of(const hg_tracker_config *config, const hg_can_frame *fram
 }
 
 /* Sample and sequence of a sensor's frame whose checksum is good. A frame of a sample that is not held has been received all the same. */
-static hg_status admit(hg_tracker *self, uint8_t i, const hg_e2e_header *header)
+static hg_status admit_value(hg_tracker *self, uint8_t i, const hg_e2e_header *header)
 {
     const hg_e2e_config *e2e = self->config->source[i].message->e2e;
     hg_link *link = &self->link[i];
@@ -128,10 +128,10 @@ static hg_status admit(hg_tracker *self, uint8_t i, const hg_e2e_header *header)
         link->k = k;
         link->timed = true;
     }
-    raise16(&link->health.lost, (status == HG_OK) ? progress.lost : 0U);
-    self->lossy = (uint16_t)((self->lossy & (uint16_t)~bit(i)) | ((progress.lost > 0U) ? bit(i) : 0U));
+    add16(&link->health.lost, (status == HG_OK) ? progress.lost : 0U);
+    self->lossy = (uint16_t)((self->lossy & (uint16_t)~mark(i)) | ((progress.lost > 0U) ? mark(i) : 0U));
     if (!held) {
-        raise16((ahead > AHEAD_MAX) ? &link->health.late : &link->health.early, 1U);
+        add16((ahead > AHEAD_MAX) ? &link->health.late : &link->health.early, 1U);
         status = HG_E_STAMP;
     }
     return status;
@@ -144,14 +144,14 @@ static hg_real period_of(const hg_code_scale *scale)
 }
 
 /* The value of a good frame goes into the filter. */
-static hg_status book(hg_tracker *self, uint8_t i, const hg_can_frame *frame, const hg_e2e_header *header)
+static hg_status book_value(hg_tracker *self, uint8_t i, const hg_can_frame *frame, const hg_e2e_header *header)
 {
     const hg_tracker_source *source = &self->config->source[i];
     const hg_code_scale *scale = source->message->scale;
     int32_t code = HG_CODE_INVALID;
     hg_status status = (self->link[i].machine.state != HG_E2E_INVALID) ? hg_frame_unpack(source->message, frame, &code) : HG_E_STATE;
     if ((status == HG_OK) && (code == HG_CODE_INVALID)) {
-        raise16(&self->link[i].health.invalid, 1U);
+        add16(&self->link[i].health.invalid, 1U);
         status = HG_E_NUMERIC;
     }
     if (status == HG_OK) {
@@ -161,7 +161,7 @@ static hg_status book(hg_tracker *self, uint8_t i, const hg_can_frame *frame, co
         }
         status = hg_fusion_receive(&self->fusion, i, header->stamp, header->counter, y);
     }
-    raise16(&self->link[i].health.good, (status == HG_OK) ? 1U : 0U);
+    add16(&self->link[i].health.good, (status == HG_OK) ? 1U : 0U);
     return status;
 }
 
@@ -169,13 +169,13 @@ static hg_status book(hg_tracker *self, uint8_t i, const hg_can_frame *frame, co
 static bool slips(hg_tracker *self, const hg_e2e_header *header, bool late)
 {
     const uint32_t modulus = self->config->fusion->modulus;
-    const bool again = self->slipped && ((((uint32_t)header->counter + modulus) - self->slipped_counter) % modulus == 1U) &&
+    const bool again = self->slipped && (((((uint32_t)header->counter + modulus) - self->slipped_counter) % modulus) == 1U) &&
                        (((uint32_t)header->stamp - self->slipped_stamp) & STAMP_MASK) == 1U;
     hg_link_health *health = &self->link[self->config->fusion->sensors].health;
     self->slipped = !again;
     self->slipped_counter = header->counter;
     self->slipped_stamp = header->stamp;
-    raise16(late ? &health->late : &health->early, again ? 0U : 1U);
+    add16(late ? &health->late : &health->early, again ? 0U : 1U);
     return again;
 }
 
@@ -196,8 +196,8 @@ static hg_status take_tick(hg_tracker *self, const hg_e2e_header *header)
         begin(self);
     }
     (void)hg_e2e_sequence(self->config->tick->e2e, &link->receiver, header, HG_E2E_ANY_STEP, &progress); /* no repetition, and any step will do */
-    raise16(&link->health.lost, ahead);
-    raise16(&link->health.good, 1U);
+    add16(&link->health.lost, ahead);
+    add16(&link->health.good, 1U);
     self->synchronised = true;
     self->slipped = false;
     self->ticked = true;
@@ -210,7 +210,7 @@ hg_status hg_tracker_receive(hg_tracker *self, const hg_can_frame *frame)
     const uint8_t i = link_of(self->config, frame);
     const uint8_t tick = self->config->fusion->sensors;
     if (i > tick) {
-        raise32(&self->unknown);
+        add32(&self->unknown);
         return HG_E_ID;
     }
     if (self->due > 0U) {
@@ -224,13 +224,13 @@ hg_status hg_tracker_receive(hg_tracker *self, const hg_can_frame *frame)
         status = HG_E_REPEATED;
     }
     if ((status == HG_OK) && (i < tick)) {
-        status = admit(self, i, &header);
+        status = admit_value(self, i, &header);
     }
     if ((status != HG_E_FORMAT) && (status != HG_E_REPEATED)) { /* a twin of another kind or length, or a double, says nothing new of its sender */
         (void)hg_e2e_machine_step(&link->machine, message->e2e->limits, status);
     }
     if (status == HG_OK) {
-        status = (i < tick) ? book(self, i, frame, &header) : take_tick(self, &header);
+        status = (i < tick) ? book_value(self, i, frame, &header) : take_tick(self, &header);
     }
     hg_link_refuse(&link->health, status);
     return status;
@@ -261,7 +261,7 @@ void hg_tracker_outage(hg_tracker *self)
 }
 
 /* Blamed sensors are out from the next sample on. */
-static void judge(hg_tracker *self, bool lost)
+static void judge_sensors(hg_tracker *self, bool lost)
 {
     if (self->config->consistency == NULL) {
         self->judging = true;
@@ -269,7 +269,7 @@ static void judge(hg_tracker *self, bool lost)
     }
     const uint16_t blamed = lost ? 0U : hg_consistency_step(&self->consistency);
     for (uint8_t i = 0U; i < self->config->fusion->sensors; i++) {
-        if ((blamed & bit(i)) != 0U) {
+        if ((blamed & mark(i)) != 0U) {
             hg_fusion_exclude(&self->fusion, i, true);
         }
     }
@@ -292,7 +292,7 @@ static hg_bus_health health_of(const hg_tracker *self, uint8_t i)
         health = HG_BUS_ABSENT;
     } else if (dead(self, i)) {
         health = HG_BUS_STALE;
-    } else if (((self->lossy & bit(i)) != 0U) || (self->fusion.sensor[i].age > self->config->fusion->heartbeat)) {
+    } else if (((self->lossy & mark(i)) != 0U) || (self->fusion.sensor[i].age > self->config->fusion->heartbeat)) {
         health = HG_BUS_LOSSY;
     } else {
         /* good */
@@ -301,7 +301,7 @@ static hg_bus_health health_of(const hg_tracker *self, uint8_t i)
 }
 
 /* A sensor that had to speak by now and did not is an event of its link, each time. */
-static void look_at_deadlines(hg_tracker *self)
+static void watch_deadlines(hg_tracker *self)
 {
     const uint8_t interval = self->config->fusion->heartbeat;
     for (uint8_t i = 0U; i < self->config->fusion->sensors; i++) {
@@ -329,7 +329,7 @@ static hg_verdict verdict_of(const hg_tracker *self)
     uint16_t numeric = self->fusion.resets;
     const uint8_t sensors = self->config->fusion->sensors;
     for (uint8_t i = 0U; i < sensors; i++) {
-        deaf |= dead(self, i) ? bit(i) : 0U;
+        deaf |= dead(self, i) ? mark(i) : 0U;
         bus = with_health(bus, i, health_of(self, i));
         numeric |= self->link[i].health.numeric;
     }
@@ -363,20 +363,20 @@ hg_status hg_tracker_step(hg_tracker *self, hg_verdict *verdict)
     }
     self->due--;
     if ((self->due > 0U) || (!self->ticked)) {
-        raise32(&self->overdue);
+        add32(&self->overdue);
     }
     const bool lost = hg_fusion_close(&self->fusion) != HG_OK; /* the state was not finite, and has begun again */
-    judge(self, lost);
-    look_at_deadlines(self);
+    judge_sensors(self, lost);
+    watch_deadlines(self);
     keep_estimate(self);
     *verdict = verdict_of(self);
-    raise16(&self->unsaid, 1U);
+    add16(&self->unsaid, 1U);
     self->k++;
     (void)hg_fusion_open(&self->fusion, NULL); /* no input is not finite, and no sample is open */
     return HG_OK;
 }
 
-static void put_status(const hg_tracker *self, const hg_verdict *verdict, hg_can_frame *frame)
+static void put_health(const hg_tracker *self, const hg_verdict *verdict, hg_can_frame *frame)
 {
     uint32_t lost = 0U;
     uint32_t refused = 0U;
@@ -407,7 +407,7 @@ uint8_t hg_tracker_report(hg_tracker *self, const hg_verdict *verdict, bool repl
     }
     if (beat) {
         self->silence = 0U;
-        put_status(self, verdict, &frame[1]);
+        put_health(self, verdict, &frame[1]);
         self->status_counter = (self->status_counter + 1U) & COUNTER_MASK;
         frames = 2U;
     }
@@ -432,7 +432,7 @@ hg_status hg_tracker_estimate(hg_tracker *self, uint8_t j, hg_can_frame *frame)
 
 static uint32_t digest_of(uint32_t digest, const void *data, size_t bytes)
 {
-    uint8_t byte[sizeof(hg_real)] = {0U};
+    uint8_t byte[sizeof(hg_real)];
     uint32_t sum = digest;
     (void)memcpy(byte, data, bytes);
     for (size_t i = 0U; i < bytes; i++) {
