@@ -208,9 +208,8 @@ def _car_following(t: Table, period: float) -> tuple[tuple[str, ...], Array, Arr
     """Two cars on a road, each with position, speed and acceleration; the second follows the first."""
     noise = t.number("acceleration_noise_mps2", 1e-9)
     F = np.array([[1.0, period, period**2 / 2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
-    g = np.array([period**2 / 2, period, 1.0]) * noise
     states = tuple(n for i in (1, 2) for n in (f"position{i}_m", f"speed{i}_mps", f"accel{i}_mps2"))
-    return states, np.kron(np.eye(2), F), np.kron(np.eye(2), np.outer(g, g))
+    return states, np.kron(np.eye(2), F), np.kron(np.eye(2), np.diag([0.0, 0.0, noise**2]))
 
 
 BUILDERS: dict[str, Callable[[Table, float], tuple[tuple[str, ...], Array, Array]]] = {

@@ -457,6 +457,7 @@ def summary(made: FusionDesign, native: TrackerNative, trace: Trace, faults: Seq
         "samples": samples,
         "sample_time_s": period,
         "known_faults": model.names,
+        "consistency_limit": native.tables.judge.limit if native.tables.judge else None,
         "frames": {
             "measurement": trace.counts["sensor"],
             "periodic": samples * native.tables.sensors,
