@@ -380,8 +380,8 @@ def make_speed(text: str) -> float:
     return speed
 
 
-def node_command(args: argparse.Namespace, made: Named, options: dict[str, Any], lockstep: bool, start: int) -> list[str]:
-    """The C node where it has this very model compiled in, otherwise the same library behind python-can."""
+def node_command(args: argparse.Namespace, made: Named, options: dict[str, Any], lockstep: bool, start: int, more: Sequence[str] = ()) -> list[str]:
+    """The C node where it has this very model compiled in, with `more` options, otherwise the same library behind python-can."""
     flags = (["--lockstep"] if lockstep else []) + (["--rest"] if start == REST else [])
     if options.get("interface") == "socketcan" and args.real in ("f32", "f64"):
         binary = choose.NODE if args.real == "f32" else choose.NODE.with_name("detector_node_f64")
@@ -389,7 +389,7 @@ def node_command(args: argparse.Namespace, made: Named, options: dict[str, Any],
             listed = subprocess.run([str(binary), "--list"], capture_output=True, text=True, check=False).stdout.split("\n")
             if f"{made.model.name} {made.tables.hash:08x}" in listed:
                 command = [str(binary), "--model", made.model.name, "--interface", str(options["channel"])]
-                return command + flags
+                return [*command, *flags, *more]
     command = [sys.executable, "-m", "hullguard", "detect", args.model, "--quiet", "--ready", "--real", args.real]
     command += [x for text in args.set for x in ("--set", text)] + (["--scenario", args.scenario] if getattr(args, "scenario", None) else [])
     for key, value in options.items():
@@ -403,9 +403,9 @@ def node_command(args: argparse.Namespace, made: Named, options: dict[str, Any],
 
 
 @contextlib.contextmanager
-def launched(args: argparse.Namespace, made: Named, options: dict[str, Any], lockstep: bool, start: int) -> Iterator[None]:
+def launched(args: argparse.Namespace, made: Named, options: dict[str, Any], lockstep: bool, start: int, more: Sequence[str] = ()) -> Iterator[None]:
     """A detector node as a process of its own, ready before the first frame and ended after the last."""
-    command = node_command(args, made, options, lockstep, start)
+    command = node_command(args, made, options, lockstep, start, more)
     say(args, f"node: {Path(command[0]).name if 'hullguard' not in command else 'hullguard detect'}, a process of its own")
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     try:

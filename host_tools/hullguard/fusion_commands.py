@@ -148,7 +148,8 @@ def _drive(args: argparse.Namespace, made: FusionDesign, drive: Array, scenario:
     if out is not None:
         make_folder(out)
     sensors = plant.Sensors(made, drive, faults, scenario, args.seed)
-    with _bus(args, made, native, options) as (bus, lockstep, speed, bus_name):
+    told: dict[str, str] = {}
+    with _bus(args, made, native, options, told) as (bus, lockstep, speed, bus_name):
         say(args, f"bus: {bus_name}")
         log = candump.Writer(out / "run.log", bus_name.split()[0] if not isinstance(bus, plant.InProcess) else "vcan0") if out else None
         run = plant.Run(made, native, bus, lockstep, speed, log)
@@ -159,6 +160,7 @@ def _drive(args: argparse.Namespace, made: FusionDesign, drive: Array, scenario:
                 log.close()
     facts = {"bus": bus_name, "seed": args.seed, "scenario": name, "loss": scenario.loss}
     result = plant.summary(made, native, trace, faults, facts)
+    result["copies"]["node_digest"] = told.get("state.digest")
     if out is not None:
         plant.write_files(out, made, trace, faults, result)
         (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
@@ -173,6 +175,9 @@ def _judged(args: argparse.Namespace, result: dict[str, Any], run: plant.Run) ->
     """Nodes that differ, and --expect."""
     if run.mismatch:
         raise ExpectationError(f"the node's frames differ from this process's: {run.mismatch}")
+    copies = result["copies"]
+    if run.lockstep and copies["node_digest"] not in (None, copies["digest"]):
+        raise ExpectationError(f"the node's states have the digest {copies['node_digest']}, this process's {copies['digest']}: build both from the same sources")
     if result["copies"]["samples_unequal"]:
         raise ExpectationError(f"copies of the filter differ in {result['copies']['samples_unequal']} samples")
     found, false = [f["detected_at"] is not None for f in result["faults"]], result["false_alarms"]["confirmed"]
@@ -218,8 +223,10 @@ def _watch(args: argparse.Namespace, made: FusionDesign) -> Callable[[int, plant
 
 
 @contextlib.contextmanager
-def _bus(args: argparse.Namespace, made: FusionDesign, native: TrackerNative, options: dict[str, Any]) -> Iterator[tuple[plant.Bus, bool, float, str]]:
-    """The bus of a run, with a node at its other end."""
+def _bus(
+    args: argparse.Namespace, made: FusionDesign, native: TrackerNative, options: dict[str, Any], told: dict[str, str]
+) -> Iterator[tuple[plant.Bus, bool, float, str]]:
+    """The bus of a run, with a node at its other end, whose counters go into `told` when it has ended."""
     speed = make_speed(args.speed)
     lockstep = speed != 1.0  # only a real-time run uses the node's timer; at any other speed the run is deterministic
     if not options and args.bus == "auto":
@@ -234,9 +241,17 @@ def _bus(args: argparse.Namespace, made: FusionDesign, native: TrackerNative, op
         return
     if options.get("interface") == "virtual":
         raise BusError("a virtual bus lives inside one process and has no second end; use --bus inprocess")
-    with opened(**options) as link, launched(args, made, options, lockstep, REST):
-        name = choose.describe(str(options.get("channel"))) if options.get("interface") == "socketcan" else f"{options.get('interface')}:{options.get('channel')}"
-        yield plant.OnCan(link, native, lockstep), lockstep, speed, name
+    with tempfile.TemporaryDirectory() as folder:
+        health = Path(folder) / "health"
+        with opened(**options) as link, launched(args, made, options, lockstep, REST, ("--health", str(health))):
+            yield plant.OnCan(link, native, lockstep), lockstep, speed, _name_of(options)
+        if health.is_file():
+            told.update(line.split() for line in health.read_text(encoding="ascii").splitlines())
+
+
+def _name_of(options: dict[str, Any]) -> str:
+    """A bus by its name."""
+    return choose.describe(str(options.get("channel"))) if options.get("interface") == "socketcan" else f"{options.get('interface')}:{options.get('channel')}"
 
 
 def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
@@ -250,7 +265,8 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
         began = f"fault {f['spec']}: began at sample {f['start']}"
         say(args, f"{began}, not found" if f["detected_at"] is None else f"{began}, found {f['delay']} samples later; suspected: {', '.join(f['candidates'])}, out of the fusion since")
     copies = result["copies"]
-    say(args, f"{copies['nodes']} copies of the filter, {copies['samples_unequal']} samples in which they differ, digest {copies['digest']}; false alarms: {result['false_alarms']['confirmed']}")
+    same = f", the node's {copies['node_digest']}" if copies.get("node_digest") else ""
+    say(args, f"{copies['nodes']} copies of the filter, {copies['samples_unequal']} samples in which they differ, digest {copies['digest']}{same}; false alarms: {result['false_alarms']['confirmed']}")
 
 
 def run_plant(args: argparse.Namespace) -> int:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from hullguard.campaign import fusion_compare
 from hullguard.campaign.fusion_compare import Way
+from hullguard.codegen.names import unit_of
 from hullguard.design.fusion_model import FusionDesign
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -73,7 +74,7 @@ def errors_figure(run: Run, states: list[str]) -> Figure:
         error, spread = run.column[f"{name}.estimate"] - run.column[name], 2.0 * run.column[f"{name}.deviation"]
         axes.fill_between(run.time, -spread, spread, color=SKY, alpha=0.3, linewidth=0)
         axes.plot(run.time, error, color=BLUE, linewidth=0.8)
-        axes.set_ylabel(name.rsplit("_", 1)[0].replace("_", " ") + f"\n{name.rsplit('_', 1)[-1]}", rotation=0, ha="right", va="center")
+        axes.set_ylabel("\n".join([name.rpartition("_")[0].replace("_", " ") or name, unit_of(name)]), rotation=0, ha="right", va="center")
         high = 1.6 * float(np.percentile(spread[min(20, len(spread) - 1) :], 98))
         axes.set_ylim(-high, high)
         _mark_faults(axes, run)
@@ -107,20 +108,16 @@ def events_figure(run: Run, names: list[str]) -> Figure:
 
 
 def ways_figure(ways: list[Way]) -> Figure:
-    """Bits against error, a line a way from no losses to the most."""
-    figure = Figure(figsize=(9.2, 3.6), layout="constrained")
+    """Error by the share of lost frames, a line a way to send."""
+    figure = Figure(figsize=(9.2, 3.8), layout="constrained")
     axes = figure.subplots()
-    names = list(dict.fromkeys(w.name for w in ways))
-    shown = [w for w in ways if w.error <= 2.2]
-    for i, name in enumerate(names):
-        part = [w for w in shown if w.name == name]
-        own = name.startswith("this model")
-        colour = COLOURS[i % len(COLOURS)] if not own else INK
-        axes.plot([w.bits for w in part], [w.error for w in part], "-", color=colour, linewidth=1.6 if own else 0.9)
-        for w in part:
-            axes.plot(w.bits, w.error, "os^D"[i // len(COLOURS) % 4], color=colour, markersize=3.5 + 18 * w.loss, label=name if w is part[0] else None)
-    axes.axhline(1.0, color=EDGE, linewidth=0.8)
-    axes.set_xlabel("bits a sensor and sample on the wire")
+    for i, name in enumerate(dict.fromkeys(w.name for w in ways)):
+        part = sorted((w for w in ways if w.name == name), key=lambda w: w.loss)
+        own, style = name.startswith("this model"), ("-", "--", ":")[i // len(COLOURS) % 3]
+        label = f"{name}: {part[0].bits:.1f} bits"
+        axes.plot([100 * w.loss for w in part], [w.error for w in part], style, marker="o", markersize=3, color=INK if own else COLOURS[i % len(COLOURS)], linewidth=2.0 if own else 1.0, label=label)
+    axes.set_ylim(0.95, min(2.6, 1.03 * max(w.error for w in ways)))
+    axes.set_xlabel("frames lost, %")
     axes.set_ylabel("position error over lossless periodic")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
@@ -189,7 +186,7 @@ def _ways(ways: list[Way], made: FusionDesign) -> list[str]:
     about = "Frames and bits a sensor and sample without losses; position error over lossless periodic sending; NEES over the number of states without losses: 1 is consistent."
     return [
         "<h2>Beside other ways to send</h2>",
-        picture(ways_figure(ways), "ways", "Bits and errors", "Each line a way to send, from no losses to 15 % (larger marks). Errors beyond 2.2 are not drawn."),
+        picture(ways_figure(ways), "ways", "Errors and losses", "Each line a way to send, with its bits a sensor and sample. Errors beyond 2.6 are not drawn."),
         table(head, rows, about),
         f'<p class="note">{fusion_compare.SIZE.runs} runs of {fusion_compare.SIZE.samples} samples each, emulated by the model\'s own noise; the same plant and noise for all. Other triggers are tuned to this model\'s rate. '
         "Batches wait for up to a sample and need no model at the sensor: at short sample times they come near.</p>",
