@@ -60,7 +60,8 @@ def main() -> int:
         for kind, size in (("bias", 3.0 * s.sigma), ("freeze", 0.0)):
             hits = 0
             for place in range(STARTS):
-                part = drive[place * step : place * step + BEFORE + WITHIN + 1]
+                part = drive[place * step : place * step + BEFORE + WITHIN + 1].copy()
+                part[:, [0, 3]] -= part[0, 0]  # each begins where the filter believes it does
                 found = drive_on(made, native, part, [FaultSpec(s.name, kind, size, BEFORE, None)], SEED + place).trace.verdict
                 hits += next((v.k <= BEFORE + WITHIN and v.candidates == 1 << i for v in found if v.candidates), False)
             check(f"{s.name}: {kind}{f' of {size:g}' if size else ''}, found within {WITHIN} samples", hits / STARTS, hits / STARTS >= FOUND)
