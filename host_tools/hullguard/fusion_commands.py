@@ -21,6 +21,7 @@ from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Verdict
 from hullguard.core.tracker import Tracker, TrackerNative
 from hullguard.design import fusion_model
+from hullguard.design.fusion import LOSS_RATES
 from hullguard.design.fusion_model import FusionDesign, design_fusion
 from hullguard.design.store import path_of
 from hullguard.errors import BusError, ExpectationError, InputError
@@ -52,7 +53,7 @@ def _design_facts(made: FusionDesign) -> dict[str, Any]:
     """Thresholds, what silence is worth, and predicted errors."""
     model, t, first = made.model, made.tables, made.found[0]
     deviation = np.sqrt(np.diag(made.mean.P))
-    worth = {f"{p:g}": [1.0 / (1.0 + r) if r >= 0.0 else 0.0 for r in row] for p, row in zip(fusion_model.LOSS_RATES, t.table[0].relax, strict=True)}
+    worth = {f"{p:g}": [1.0 / (1.0 + r) if r >= 0.0 else 0.0 for r in row] for p, row in zip(LOSS_RATES, t.table[0].relax, strict=True)}
     return {
         "model": model.name,
         "kind": "fusion",
@@ -92,7 +93,11 @@ def run_design(args: argparse.Namespace) -> int:
     write_fusion_design(made, facts, out / f"{model.name}.html")
     for i, name in enumerate(model.names):
         worth = ", ".join(f"{facts['silence_is_worth'][p][i]:.3f}" for p in ("0", "0.05", "0.1", "0.15"))
-        say(args, f"  {name}: speaks beyond {facts['delta'][i]:.4g} standard deviations, {facts['rates'][i]:.3f} frames a sample; silence is worth {worth} of a value at 0, 5, 10, 15 % loss")
+        say(
+            args,
+            f"  {name}: speaks beyond {facts['delta'][i]:.4g} standard deviations, {facts['rates'][i]:.3f} frames a sample; "
+            f"silence is worth {worth} of a value at 0, 5, 10, 15 % loss",
+        )
     say(args, "  predicted standard deviations: " + ", ".join(f"{n} {v:.4g}" for n, v in facts["predicted"].items()))
     say(args, f"model {model.name}, hash {made.tables.hash:08x}: tables, DBC and report in {out}" + ("" if own else f"; thresholds kept in {beside.name}"))
     emit(args, facts | {"out": str(out), "reused": own})
@@ -223,9 +228,7 @@ def _watch(args: argparse.Namespace, made: FusionDesign) -> Callable[[int, plant
 
 
 @contextlib.contextmanager
-def _bus(
-    args: argparse.Namespace, made: FusionDesign, native: TrackerNative, options: dict[str, Any], told: dict[str, str]
-) -> Iterator[tuple[plant.Bus, bool, float, str]]:
+def _bus(args: argparse.Namespace, made: FusionDesign, native: TrackerNative, options: dict[str, Any], told: dict[str, str]) -> Iterator[tuple[plant.Bus, bool, float, str]]:
     """The bus of a run, with a node at its other end, whose counters go into `told` when it has ended."""
     speed = make_speed(args.speed)
     lockstep = speed != 1.0  # only a real-time run uses the node's timer; at any other speed the run is deterministic
@@ -246,7 +249,7 @@ def _bus(
         with opened(**options) as link, launched(args, made, options, lockstep, REST, ("--health", str(health))):
             yield plant.OnCan(link, native, lockstep), lockstep, speed, _name_of(options)
         if health.is_file():
-            told.update(line.split() for line in health.read_text(encoding="ascii").splitlines())
+            told.update((name, value) for name, value in map(str.split, health.read_text(encoding="ascii").splitlines()))
 
 
 def _name_of(options: dict[str, Any]) -> str:
@@ -258,15 +261,26 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
     """The result for people."""
     frames = result["frames"]
     share, whole = frames["bits_sensors"] / max(1, frames["bits_sensors_periodic"]), frames["bits"] / max(1, frames["bits_periodic"])
-    say(args, f"{result['samples']} samples, {frames['measurement']} sensor frames of {frames['periodic']}; {100 * share:.1f} % of the sensors' bits, {100 * whole:.1f} % of all with tick, verdicts and estimates")
+    say(
+        args,
+        f"{result['samples']} samples, {frames['measurement']} sensor frames of {frames['periodic']}; {100 * share:.1f} % of the sensors' bits, "
+        f"{100 * whole:.1f} % of all with tick, verdicts and estimates",
+    )
     for name, e in result["errors"].items():
         say(args, f"  {name}: rms error {e['rms']:.4g}, predicted {e['predicted']:.4g}; within two standard deviations {100 * e['within_2_deviations']:.1f} %")
     for f in result["faults"]:
         began = f"fault {f['spec']}: began at sample {f['start']}"
-        say(args, f"{began}, not found" if f["detected_at"] is None else f"{began}, found {f['delay']} samples later; suspected: {', '.join(f['candidates'])}, out of the fusion since")
+        say(
+            args,
+            f"{began}, not found" if f["detected_at"] is None else f"{began}, found {f['delay']} samples later; suspected: {', '.join(f['candidates'])}, out of the fusion since",
+        )
     copies = result["copies"]
     same = f", the node's {copies['node_digest']}" if copies.get("node_digest") else ""
-    say(args, f"{copies['nodes']} copies of the filter, {copies['samples_unequal']} samples in which they differ, digest {copies['digest']}{same}; false alarms: {result['false_alarms']['confirmed']}")
+    say(
+        args,
+        f"{copies['nodes']} copies of the filter, {copies['samples_unequal']} samples in which they differ, digest {copies['digest']}{same}; "
+        f"false alarms: {result['false_alarms']['confirmed']}",
+    )
 
 
 def run_plant(args: argparse.Namespace) -> int:
@@ -375,5 +389,5 @@ INSTEAD = {
 def dispatch(args: argparse.Namespace) -> int:
     """The command, or a line that says which one to take."""
     if args.command not in COMMANDS:
-        raise InputError(f"{args.command} does not take a model of kind \"fusion\": {INSTEAD[args.command]}")
+        raise InputError(f'{args.command} does not take a model of kind "fusion": {INSTEAD[args.command]}')
     return COMMANDS[args.command](args)

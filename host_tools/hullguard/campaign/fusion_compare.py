@@ -1,5 +1,7 @@
-"""What a fusion model's trigger costs and reaches beside other ways to send: periodic, decimated, batched, dropped at random, and other triggers, at several loss
-rates. Runs by the C library (core/fusion.py), all with the same plant and noise; batches, whose estimate no data decides, by their covariance.
+"""What a fusion model's trigger costs and reaches beside other ways to send, at several loss rates.
+
+Periodic, decimated, batched, dropped at random, and other triggers. Runs by the C library (core/fusion.py), all with the same plant and noise; batches, whose covariance
+depends on no data, by that.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 
 from hullguard.bus.bits import worst_bits
 from hullguard.campaign import fusion_study as study
-from hullguard.core.fusion import Bench, Case, Filter, Outcome
+from hullguard.core.fusion import Bench, Filter, Outcome
 from hullguard.core.library import library
 from hullguard.design import fusion as design
 from hullguard.design.fusion_model import FusionDesign, message_table
@@ -82,7 +84,7 @@ def _batched(made: FusionDesign, positions: tuple[int, ...], loss: float) -> flo
     return float(np.sqrt(total / (STEPS - STEPS // 10)))
 
 
-def _with(plant: design.Fusion, P: Array, alive: Array) -> Array:
+def _with(plant: design.Fusion, P: Array, alive: Any) -> Array:
     """P after a value of each sensor that is heard."""
     for i in np.flatnonzero(alive):
         g = P @ plant.C[i]

@@ -203,7 +203,7 @@ class Tracker:
 
     def health(self) -> dict[str, int]:
         """Counters of all links, NAME.counter."""
-        found = {}
+        found: dict[str, int] = {}
         names = [*(s.name for s in self.native.tables.source), "tick"]
         for i, name in enumerate(names):
             health = self._lib.hg_tracker_health(self.node, i)

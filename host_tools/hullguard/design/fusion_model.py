@@ -131,12 +131,12 @@ class FusionTables:
 
     @property
     def states(self) -> int:
-        """n."""
+        """N."""
         return len(self.A)
 
     @property
     def sensors(self) -> int:
-        """m."""
+        """M."""
         return len(self.R)
 
     @property
@@ -274,7 +274,9 @@ def design_fusion(model: FusionModel, fresh: bool = False) -> tuple[FusionDesign
     stored = None if fresh else read(path_of(model.path), model)
     made = FusionDesign(model, stored or find(model))
     if made.load_bound > model.load_max:
-        raise InputError(f"model {model.name}: the bus could be loaded to {100 * made.load_bound:.3g} %, more than load_max = {model.load_max:g}; lower the sample rate or raise bitrate_bps")
+        raise InputError(
+            f"model {model.name}: the bus could be loaded to {100 * made.load_bound:.3g} %, more than load_max = {model.load_max:g}; lower the sample rate or raise bitrate_bps"
+        )
     return made, stored is not None
 
 

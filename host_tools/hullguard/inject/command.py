@@ -20,8 +20,8 @@ from hullguard.inject.codec import Codec, design_codec, read_codec
 from hullguard.inject.directive import Directive, parse_directive, read_directives
 from hullguard.inject.engine import Injector, Sent
 from hullguard.inject.labels import Ledger
-from hullguard.model import fusion
 from hullguard.inject.options import declared
+from hullguard.model import fusion
 
 BUS_KEYS = ("channel", "interface", "bitrate", "fd", "data_bitrate", "timing")
 

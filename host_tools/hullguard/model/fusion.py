@@ -201,7 +201,7 @@ def _constant_velocity(t: Table, period: float) -> tuple[tuple[str, ...], Array,
     noise = t.number("speed_noise_mps", 1e-9)
     states = tuple(n for a in axes for n in (f"{a}_m", f"{a}_speed_mps"))
     F = np.array([[1.0, period], [0.0, 1.0]])
-    return states, np.kron(np.eye(len(axes)), F), np.kron(np.eye(len(axes)), np.diag([0.0, noise**2]))
+    return states, np.kron(np.eye(len(axes)), F), np.diag(np.tile([0.0, noise**2], len(axes)))
 
 
 def _car_following(t: Table, period: float) -> tuple[tuple[str, ...], Array, Array]:
@@ -209,7 +209,7 @@ def _car_following(t: Table, period: float) -> tuple[tuple[str, ...], Array, Arr
     noise = t.number("acceleration_noise_mps2", 1e-9)
     F = np.array([[1.0, period, period**2 / 2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
     states = tuple(n for i in (1, 2) for n in (f"position{i}_m", f"speed{i}_mps", f"accel{i}_mps2"))
-    return states, np.kron(np.eye(2), F), np.kron(np.eye(2), np.diag([0.0, 0.0, noise**2]))
+    return states, np.kron(np.eye(2), F), np.diag(np.tile([0.0, 0.0, noise**2], 2))
 
 
 BUILDERS: dict[str, Callable[[Table, float], tuple[tuple[str, ...], Array, Array]]] = {

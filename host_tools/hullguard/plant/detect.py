@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from typing import Protocol
+from typing import Any
 
 from hullguard.bus import candump
 from hullguard.bus.link import CanLink
@@ -16,42 +16,19 @@ STAMP_AGE_S = 10.0  # older ones are of another clock
 STAMPS = 7  # samples ahead that a stamp can tell
 
 
-class Stepping(Protocol):
-    """A node of any kind."""
-
-    def receive(self, frame: Frame) -> int:
-        """A frame from the bus; the status of the library."""
-
-    def step(self) -> Verdict | None:
-        """One step that is due."""
-
-    def report(self, reply: bool) -> list[Frame]:
-        """Frames to send after it."""
-
-    def overdue(self) -> None:
-        """The closing frame has not come in time."""
-
-    def expect(self, samples: int) -> None:
-        """A closing frame cannot be further ahead than this."""
-
-    def outage(self) -> None:
-        """More closing frames may have been missed than a stamp can tell."""
-
-    def health(self) -> dict[str, int]:
-        """Counters of all links."""
-
-
 class Detector:
     """A node fed with frames from anywhere; verdict frames go to `send`, verdicts to `watch`.
 
     With `period_s` the time stamps of the closing frames are watched: a stamp tells a gap of up to 7 samples, a longer one is an outage.
     """
 
+    node: Node
+
     def __init__(self, native: Native, start: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None = None) -> None:
         self.begin(Node(native, start), native.tables.groups[native.tables.closing].message.id, lockstep, send, watch, period_s)
 
-    def begin(self, node: Stepping, closing: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None) -> None:
-        """With a node of any kind; `closing` is the identifier of the frame that closes a sample."""
+    def begin(self, node: Any, closing: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None) -> None:
+        """With a node of any kind that has the methods of Node; `closing` is the identifier of the frame that closes a sample."""
         self.node, self._closing = node, closing
         self._lockstep, self._send, self._watch, self._period = lockstep, send, watch, period_s
         self._closed_at: float | None = None

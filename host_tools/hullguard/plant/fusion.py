@@ -148,7 +148,7 @@ class InProcess:
         """All copies have it already."""
 
     def answer(self, k: int, expected: list[Frame]) -> list[Frame]:
-        """This process's own."""
+        """What the process's own node sent."""
         return expected
 
 
@@ -235,7 +235,9 @@ class Plain:
 class Run:
     """The loop."""
 
-    def __init__(self, made: FusionDesign, native: TrackerNative, bus: Bus, lockstep: bool = True, speed: float = math.inf, log: candump.Writer | None = None, start: int = REST) -> None:
+    def __init__(
+        self, made: FusionDesign, native: TrackerNative, bus: Bus, lockstep: bool = True, speed: float = math.inf, log: candump.Writer | None = None, start: int = REST
+    ) -> None:
         self.made, self.native, self.bus, self.lockstep, self.speed, self._log = made, native, bus, lockstep, speed, log
         self.centre = Tracker(native, start)
         self.copies = [Tracker(native, start) for _ in range(native.tables.sensors)]
@@ -261,8 +263,8 @@ class Run:
     def _sample(self, k: int, truth: Array, sensors: Sensors) -> None:
         t, time_s = self.trace, k * self.made.model.sample_time_s
         late, self._waiting = self._waiting, []
-        for i, frame in late:
-            self._deliver(i, frame, time_s)
+        for i, overdue in late:
+            self._deliver(i, overdue, time_s)
         reading, events, lost, bits = sensors.read(k), 0, 0, 0
         for i, sender in enumerate(self.senders):
             gone, waits, dice = sensors.lost(), sensors.late(), sensors.dice()
@@ -336,7 +338,8 @@ class Run:
         self.plain.step()
         if said[0] is None:
             raise ExpectationError(f"the tick of sample {k} was not accepted: {self.centre.health()}")
-        same = all(v == said[0] for v in said) and all(n.digest == self.centre.digest for n in (*self.copies, self.plain))
+        digests = {self.plain.digest, *(n.digest for n in (self.centre, *self.copies))}
+        same = all(v == said[0] for v in said) and len(digests) == 1
         self.trace.unequal += not same
         expected = self.centre.report(self.lockstep)
         got = self.bus.answer(k, expected)
@@ -363,7 +366,9 @@ class Run:
                 found = [int.from_bytes(f.data[2:6], "little") for f in (theirs, ours)]
                 return f"the node runs a model with hash {found[0]:08x}, this process {found[1]:08x}; build the node from this model"
             if theirs != ours:
-                return f"sample {k}: the node sent {theirs.id:X}#{theirs.data.hex()}, this process {ours.id:X}#{ours.data.hex()}" + ("; start the node with --rest" if k == 0 else "")
+                return f"sample {k}: the node sent {theirs.id:X}#{theirs.data.hex()}, this process {ours.id:X}#{ours.data.hex()}" + (
+                    "; start the node with --rest" if k == 0 else ""
+                )
         return f"sample {k}: the node sent {len(got)} frames, this process {len(expected)}"
 
     def _hear_out(self, count: int) -> None:

@@ -17,7 +17,7 @@ from hullguard.codegen.names import unit_of
 from hullguard.design.fusion_model import FusionDesign
 from hullguard.errors import InputError
 from hullguard.model.table import Array
-from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, PINK, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
+from hullguard.report.page import AMBER, BLUE, GREEN, INK, PINK, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
 COMPARED = "compare.json"
 CHANGES_MAX = 100
@@ -25,7 +25,7 @@ COLOURS = (BLUE, AMBER, GREEN, PINK, SKY, RED)
 # Bytes of 100 samples of five sensors, frames of 5 bytes, and what the source says of the errors.
 SOURCE = (
     ("periodic", 2500, "the reference"),
-    ("observation trigger", 1200, "close to periodic"),
+    ("observation trigger", 1200, ""),
     ("innovation trigger", 1050, "below periodic"),
     ("variance trigger", 1100, "below periodic"),
 )
@@ -115,7 +115,16 @@ def ways_figure(ways: list[Way]) -> Figure:
         part = sorted((w for w in ways if w.name == name), key=lambda w: w.loss)
         own, style = name.startswith("this model"), ("-", "--", ":")[i // len(COLOURS) % 3]
         label = f"{name}: {part[0].bits:.1f} bits"
-        axes.plot([100 * w.loss for w in part], [w.error for w in part], style, marker="o", markersize=3, color=INK if own else COLOURS[i % len(COLOURS)], linewidth=2.0 if own else 1.0, label=label)
+        axes.plot(
+            [100 * w.loss for w in part],
+            [w.error for w in part],
+            style,
+            marker="o",
+            markersize=3,
+            color=INK if own else COLOURS[i % len(COLOURS)],
+            linewidth=2.0 if own else 1.0,
+            label=label,
+        )
     axes.set_ylim(0.95, min(2.6, 1.03 * max(w.error for w in ways)))
     axes.set_xlabel("frames lost, %")
     axes.set_ylabel("position error over lossless periodic")
@@ -141,7 +150,12 @@ def _summary(run: Run) -> list[str]:
         tile("faulty sensors found", f"{len(hits)} of {len(found)}", late or "no fault", "good" if len(hits) == len(found) else "bad"),
         tile("false alarms", str(false), "a stated rate, not a bound", "bad" if false else "good"),
         tile("sensors' bits", percent(share), f"of periodic; {percent(whole)} with tick, verdicts, estimates"),
-        tile("copies of the filter", str(copies["nodes"]), f"differ in {plural(copies['samples_unequal'], 'sample')}; digest {copies['digest']}", "bad" if copies["samples_unequal"] else "good"),
+        tile(
+            "copies of the filter",
+            str(copies["nodes"]),
+            f"differ in {plural(copies['samples_unequal'], 'sample')}; digest {copies['digest']}",
+            "bad" if copies["samples_unequal"] else "good",
+        ),
         "</div>",
     ]
 
@@ -152,7 +166,12 @@ def _errors(run: Run, made: FusionDesign) -> list[str]:
     head = ["state", "#rms error", "#its own deviation", "#predicted", "#within two deviations"]
     return [
         "<h2>Estimates</h2>",
-        picture(errors_figure(run, states), "errors", "Errors of the estimate", "Estimate less truth, and two of the filter's own standard deviations either way. Dashed: a fault begins; solid: its sensor is out."),
+        picture(
+            errors_figure(run, states),
+            "errors",
+            "Errors of the estimate",
+            "Estimate less truth, and two of the filter's own standard deviations either way. Dashed: a fault begins; solid: its sensor is out.",
+        ),
         table(head, rows, "From sample 100 to the first fault. Predicted: by the design, without losses. A consistent filter has 95 % within two deviations."),
     ]
 
@@ -166,9 +185,18 @@ def _events(run: Run, made: FusionDesign) -> list[str]:
     kinds.append(["all", frames["bits"], frames["bits_periodic"]])
     return [
         "<h2>Frames, and who is suspected</h2>",
-        picture(events_figure(run, names), "events", "Frames and scores", "Frames of each sensor, lost ones as crosses; below, what speaks for a bias of each sensor (twice the logarithm of a likelihood ratio), and its limit."),
+        picture(
+            events_figure(run, names),
+            "events",
+            "Frames and scores",
+            "Frames of each sensor, lost ones as crosses; below, what speaks for a bias of each sensor (twice the logarithm of a likelihood ratio), and its limit.",
+        ),
         table(["sensor", "#frames", "#a sample", "#lost"], rows),
-        table(["frames", "#bits", "#if every sensor sent every sample"], kinds, f"Exact, stuff bits included; bus load {percent(frames['load_mean'])}, at most {percent(frames['load_bound'])}."),
+        table(
+            ["frames", "#bits", "#if every sensor sent every sample"],
+            kinds,
+            f"Exact, stuff bits included; bus load {percent(frames['load_mean'])}, at most {percent(frames['load_bound'])}.",
+        ),
     ]
 
 
@@ -188,8 +216,8 @@ def _ways(ways: list[Way], made: FusionDesign) -> list[str]:
         "<h2>Beside other ways to send</h2>",
         picture(ways_figure(ways), "ways", "Errors and losses", "Each line a way to send, with its bits a sensor and sample. Errors beyond 2.6 are not drawn."),
         table(head, rows, about),
-        f'<p class="note">{fusion_compare.SIZE.runs} runs of {fusion_compare.SIZE.samples} samples each, emulated by the model\'s own noise; the same plant and noise for all. Other triggers are tuned to this model\'s rate. '
-        "Batches wait for up to a sample and need no model at the sensor: at short sample times they come near.</p>",
+        f'<p class="note">{fusion_compare.SIZE.runs} runs of {fusion_compare.SIZE.samples} samples each, emulated by the model\'s own noise; the same plant and noise for all. '
+        "Other triggers are tuned to this model's rate. Batches wait for up to a sample and need no model at the sensor: at short sample times they come near.</p>",
         *_published(by, made),
     ]
 
@@ -207,24 +235,35 @@ def _published(by: dict[tuple[str, float], Way], made: FusionDesign) -> list[str
     best = min((w for (name, loss), w in by.items() if loss == 0.0 and name != "periodic"), key=lambda w: w.error)
     return [
         "<h3>The source's table</h3>",
-        table(head, rows, "Five sensors, 100 samples, frames of 5 bytes there. Shares here are of frames, of the same size each; errors over periodic sending. The source prints no error figures."),
+        table(
+            head,
+            rows,
+            "Five sensors, 100 samples, frames of 5 bytes there. Shares here are of frames; errors over periodic sending. The source prints no error figures.",
+        ),
         "<p>The source finds errors below those of periodic sending for its innovation and variance triggers. With the right model that cannot be. "
-        "What an event-triggered node has heard is a part of what a periodic one hears, and the best estimate from a part of the data has no smaller mean squared error than the best "
-        "estimate from all of it: E|x − E[x|G]|² ≥ E|x − E[x|F]|² wherever G is contained in F. "
-        f"Measured here, the best way beside periodic sending is {esc(best.name)}, {num(best.error, 4)} times the error. The true claim is another: at equal bits events are far better than "
-        "periodic sending, when silence is used as the information that it is. A variance of raw readings measures motion, not information.</p>",
+        "What an event-triggered node has heard is a part of what a periodic one hears, and the best estimate from a part of the data has no smaller mean squared error "
+        "than the best estimate from all of it: E|x − E[x|G]|² ≥ E|x − E[x|F]|² wherever G is contained in F. "
+        f"Measured here, the best way beside periodic sending is {esc(best.name)}, {num(best.error, 4)} times the error. The true claim is another: "
+        "at equal bits events are far better than periodic sending, when silence is used as the information that it is. A variance of raw readings measures motion, not information.</p>",
     ]
 
 
 def _verdicts(run: Run) -> list[str]:
-    rows = [[v["k"], v["plant"], ", ".join(v["candidates"]) or "–", ", ".join(f"{n} {s}" for n, s in v["bus"].items() if s != "good") or "all good"] for v in run.info["verdicts"][:CHANGES_MAX]]
+    rows = [
+        [v["k"], v["plant"], ", ".join(v["candidates"]) or "–", ", ".join(f"{n} {s}" for n, s in v["bus"].items() if s != "good") or "all good"]
+        for v in run.info["verdicts"][:CHANGES_MAX]
+    ]
     more = len(run.info["verdicts"]) - CHANGES_MAX
     counted = [[n, c] for n, c in run.info["communication"].items() if c and not n.endswith(".good")]
     return [
         "<h2>Verdicts</h2>",
-        table(["#sample", "sensors", "suspected", "links"], rows, f"{more} more changes are in run.json." if more > 0 else "Every change. A suspected sensor is out of the fusion in every node from the next sample on."),
+        table(
+            ["#sample", "sensors", "suspected", "links"],
+            rows,
+            f"{more} more changes are in run.json." if more > 0 else "Every change. A suspected sensor is out of the fusion in every node from the next sample on.",
+        ),
         *([table(["counter", "#frames"], counted, "What else was counted on the links.")] if counted else []),
-        '<p class="note">The basis is statistical: probabilities that hold with the model\'s noise, not bounds. A rate of false alarms is stated, and judged by make fusion-study.</p>',
+        '<p class="note">The basis is statistical: probabilities that hold with the model\'s noise, not bounds. The rate of false alarms is judged by make fusion-study.</p>',
     ]
 
 
