@@ -244,7 +244,7 @@ def _published(by: dict[tuple[str, float], Way], made: FusionDesign) -> list[str
         "What an event-triggered node has heard is a part of what a periodic one hears, and the best estimate from a part of the data has no smaller mean squared error "
         "than the best estimate from all of it: E|x − E[x|G]|² ≥ E|x − E[x|F]|² wherever G is contained in F. "
         f"Measured here, the best way beside periodic sending is {esc(best.name)}, {num(best.error, 4)} times the error. The true claim is another: "
-        "at equal bits events are far better than periodic sending, when silence is used as the information that it is. A variance of raw readings measures motion, not information.</p>",
+        "at equal bits events are far better than periodic sending, when silence is used as information. A variance of raw readings measures motion, not information.</p>",
     ]
 
 
