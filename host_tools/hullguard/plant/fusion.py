@@ -30,21 +30,31 @@ from hullguard.plant.recording import read_columns
 
 ANSWER_TIMEOUT_S = 10.0
 RECORDED = ("speed1_mps", "speed2_mps", "gap2_m")  # columns of a recording of two cars
+SPRING = (1e-4, 0.02)  # pull a second and unit of position, and of speed
 SETTLE = 100  # samples before errors count
 
 
 # --- drives --------------------------------------------------------------------------------------------------------------------------------
 
 
+def _leashed(model: FusionModel) -> Array:
+    """A of a plant that noise alone would carry out of its sensors' range in a long run: each position on a spring so weak that no filter sees it."""
+    A = model.plant.A.copy()
+    if model.plant.builder == "constant_velocity":
+        for j in range(0, len(A), 2):
+            A[j + 1, [j, j + 1]] -= model.sample_time_s * np.array(SPRING)
+    return A
+
+
 def noise_drive(model: FusionModel, scenario: FusionScenario, samples: int, seed: int) -> Array:
     """States by the model's own noise, samples x n."""
-    rng, p = np.random.default_rng([seed, 1]), model.plant
+    rng, p, A = np.random.default_rng([seed, 1]), model.plant, _leashed(model)
     values, vectors = np.linalg.eigh(p.Q)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     x = p.x0 + np.sqrt(np.diag(p.P0)) * rng.standard_normal(len(p.x0))
     found = np.empty((samples, len(x)))
     for k in range(samples):
-        x = p.A @ x + root @ rng.standard_normal(len(x)) + (np.array(scenario.jump) if k == scenario.jump_at else 0.0)
+        x = A @ x + root @ rng.standard_normal(len(x)) + (np.array(scenario.jump) if k == scenario.jump_at else 0.0)
         found[k] = x
     return found
 
