@@ -408,6 +408,8 @@ static void test_a_value_goes_round(void **state)
         }
     }
     assert_true(r.origin[0] < -30); /* -597 in steps of 16 */
+    /* Of a sample that is not held: by the present origin. */
+    assert_near(-512.0 - (16.0 * (double)r.origin[0]), hg_fusion_local(&r.self.fusion, 0U, (uint8_t)((r.self.k + 5U) & 15U), R(-512)), 1e-6);
 }
 
 /* ---- time ---- */
