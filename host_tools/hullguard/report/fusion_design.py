@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from hullguard.design.fusion import LOSS_RATES
 from hullguard.design.fusion_model import FusionDesign
-from hullguard.report.page import BLUE, EDGE, GREEN, esc, num, page, percent, picture, table, tile
+from hullguard.report.page import BLUE, EDGE, GREEN, RC, esc, num, page, percent, picture, table, tile
 
 SHOWN = (0.0, 0.05, 0.10, 0.15)
 
@@ -47,6 +48,8 @@ def write_fusion_design(made: FusionDesign, facts: dict[str, Any], path: Path) -
     ]
     head = ["sensor", "frame", "#bytes", "#σ", "#δ, standard deviations", "#frames a sample", *(f"#silence at {100 * p:g} % loss" for p in SHOWN)]
     sets = [[", ".join(s["alive"]), ", ".join(f"{d:.3g}" for d in s["delta"]), ", ".join(f"{r:.3f}" for r in s["rates"])] for s in facts["sets"]]
+    with mpl.rc_context(RC):
+        figure = _worth(facts)
     share = facts["bytes"]["event"] / facts["bytes"]["periodic"]
     body = [
         f"<h1>{esc(model.name)}: design of a fusion filter</h1>",
@@ -60,7 +63,7 @@ def write_fusion_design(made: FusionDesign, facts: dict[str, Any], path: Path) -
         "</div>",
         "<h2>Sensors</h2>",
         table(head, rows, "Silence: the share of a value that it is worth, at that rate of lost frames."),
-        picture(_worth(facts), "worth", "Information by frames and by silence", "What each sensor contributes without losses, by its frames and by its silence."),
+        picture(figure, "worth", "Information by frames and by silence", "What each sensor contributes without losses, by its frames and by its silence."),
         "<h2>Errors to expect</h2>",
         table(["state", "#standard deviation"], list(facts["predicted"].items()), "From the mean course of the covariance, without losses; no simulation is part of it."),
         "<h2>When a sensor is out</h2>",

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,7 +18,7 @@ from hullguard.codegen.names import unit_of
 from hullguard.design.fusion_model import FusionDesign
 from hullguard.errors import InputError
 from hullguard.model.table import Array
-from hullguard.report.page import AMBER, BLUE, GREEN, INK, PINK, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
+from hullguard.report.page import AMBER, BLUE, GREEN, INK, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
 COMPARED = "compare.json"
 CHANGES_MAX = 100
@@ -281,9 +282,10 @@ def compared(directory: Path, made: FusionDesign) -> list[Way]:
 def write_fusion_report(directory: Path, made: FusionDesign) -> Path:
     """Write report.html."""
     run = read_run(directory)
-    body = [*_summary(run), *_errors(run, made), *_events(run, made)]
-    if fusion_compare.independent(made) and made.model.trigger.kind == "innovation":
-        body += _ways(compared(directory, made), made)
+    with mpl.rc_context(RC):
+        body = [*_summary(run), *_errors(run, made), *_events(run, made)]
+        if fusion_compare.independent(made) and made.model.trigger.kind == "innovation":
+            body += _ways(compared(directory, made), made)
     body += _verdicts(run)
     path = directory / "report.html"
     path.write_text(page(f"{made.model.name}: {run.info['scenario']}", body), encoding="utf-8")
