@@ -271,6 +271,7 @@ WRONG: list[tuple[str, Any, str]] = [
     ("sensors.0.frame", {"id": 0x7F0}, "after the tick"),
     ("sensors.0.frame", {"id": 0x140, "protection": "P05"}, "counter of 16 values"),
     ("sensors.0.name", "x2_m", "with a name each"),
+    ("sensors.0.name", "tick", "filter's own"),
     ("sensors.0.colour", "red", "unknown key"),
     ("trigger.kind", "telepathy", "not one of"),
     ("trigger.kind", "observation", "needs its thresholds"),

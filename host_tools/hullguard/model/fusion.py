@@ -43,6 +43,7 @@ ENCODINGS = ("float32", "int16")
 DRIVES = ("noise", "traffic")
 SENSORS_MAX, STATES_MAX = 16, 32
 DEAD = "dead"
+OWN = ("tick", "verdict", "status")  # messages beside the sensors'
 _DEAD = re.compile(r"^(?P<name>\w+):dead@(?P<start>\d+)(?:\.\.(?P<end>\d+))?$")
 CODES = 32767  # of 16 bits, on either side of 0
 
@@ -263,6 +264,8 @@ def _read_sensor(t: Table, states: Sequence[str]) -> FusionSensor:
     name = t.text("name")
     if not NAME.match(name):
         raise t.error("name", f"'{name}' is no name: small letters, digits and underscores, at most 31, a letter first")
+    if name in OWN:
+        raise t.error("name", f"'{name}' is a message of the filter's own; choose another")
     encoding = t.text("encoding", "float32", ENCODINGS)
     inner = t.table("frame")
     frame = read_frame(inner, int(inner.whole("id", 0, 0x1FFFFFFF)) & 0xFFFF)
