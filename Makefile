@@ -43,6 +43,7 @@ REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PRE
 
 LIB_SRC     := $(wildcard firmware/src/*.c)
 MODEL_SRC   := $(wildcard firmware/models/*.c)
+FUSION_MODELS := $(notdir $(basename $(shell grep -l 'hullguard/tracker\.h' firmware/models/*.h)))# filters on a bus: another storage, no fixed point
 CORE_SRC    := $(wildcard host_tools/hullguard/core/*.c)
 HOST_HAL    := loopback socketcan
 HOST_HAL_SRC := $(foreach h,$(HOST_HAL),$(wildcard hal/$(h)/*.c))

@@ -4,7 +4,7 @@ BUILD ?= build
 APPS_WARN := -std=c11 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wstrict-prototypes \
              -Wmissing-prototypes -Wshadow -Wcast-align -Wvla -Wundef -Wswitch-enum -ffp-contract=off -Werror
 APPS_FLAGS := -O2 -g -Ifirmware/include -Ifirmware/models -Ifirmware/apps -Ihal -Ihal/socketcan -MMD -MP
-APPS_COMMON := $(wildcard firmware/src/*.c firmware/models/*.c hal/socketcan/*.c) firmware/apps/models.c
+APPS_COMMON := $(wildcard firmware/src/*.c firmware/models/*.c hal/socketcan/*.c) firmware/apps/models.c firmware/apps/tracker_models.c firmware/apps/units.c
 APPS_OBJECTS_f32 := $(patsubst %.c,$(BUILD)/apps-f32/%.o,$(APPS_COMMON))
 APPS_OBJECTS_f64 := $(patsubst %.c,$(BUILD)/apps-f64/%.o,$(APPS_COMMON))
 

@@ -1,13 +1,13 @@
 /** @file
- *  A detector ECU on Linux: a model's node (hullguard/node.h) on a CAN interface (hal/socketcan).
+ *  A detector ECU on Linux: a model's node (hullguard/node.h, or hullguard/tracker.h of a fusion filter) on a CAN interface (hal/socketcan).
  *
  *  In lockstep every closing frame is answered with a verdict and no clock is looked at. Otherwise a deadline timer watches the closing
  *  frames: it is set anew by each one, and a sample whose closing frame is overdue is closed without it. Where time and steps have come
  *  apart by more than a stamp can tell, as after the process was stopped, the node is told of an outage. */
 #define _POSIX_C_SOURCE 200809L
 
-#include "models.h"
 #include "socketcan.h"
+#include "units.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -30,12 +30,13 @@
 #define BEHIND_MAX 255U            /* overdue samples caught up with; by then every group is stale (hold.h) */
 #define PAUSE_FIRST_US 250U        /* of a send's backoff, doubled each time */
 #define PAUSE_ALL_MAX_US 50000U    /* longest time one frame is offered to a bus that has no room */
-#define FILTERS_MAX HG_GROUPS_MAX
+#define FILTERS_MAX (HG_FUSION_SENSORS_MAX + 1U)
 
-_Static_assert(FILTERS_MAX <= HG_SOCKETCAN_FILTERS_MAX, "a filter for every group");
+_Static_assert(HG_GROUPS_MAX <= FILTERS_MAX, "a filter for every group");
+_Static_assert(FILTERS_MAX <= HG_SOCKETCAN_FILTERS_MAX, "a filter for every sensor and the tick");
 
 typedef struct {
-    const app_model *model;
+    app_unit         unit;         /* of the model, started or not */
     const char      *interface;
     const char      *timing;       /* file name or null */
     const char      *health;       /* the same */
@@ -57,7 +58,6 @@ typedef struct {
     options      options;
     hg_socketcan can;
     hg_hal       hal;
-    hg_node     *node;
     hg_verdict   verdict;          /* of the last step */
     uint64_t     deadline_us;      /* HG_HAL_FOREVER: no closing frame is waited for */
     uint64_t     status_us;        /* time of the next status line */
@@ -87,7 +87,7 @@ static const char usage[] =
     "  --samples N        stop after N samples (0: never)\n"
     "  --status           print a line of status every second\n"
     "  --timing FILE      when done, write the missed deadlines to FILE\n"
-    "  --health FILE      when done, write every counter of every group to FILE\n"
+    "  --health FILE      when done, write every counter of every group to FILE; of a fusion filter the digest of its states, too\n"
     "  --list             print the models compiled in, each with its hash, and end\n"
     "  --help, --version\n"
     "Prints 'ready' when it listens. SIGINT and SIGTERM end it. Exit status: 0 done, 1 failed, 2 bad option, 3 the bus cannot be opened.\n";
@@ -106,8 +106,9 @@ static int refuse(const char *what, const char *value, const char *cure)
 static int refuse_model(const char *name)
 {
     (void)fprintf(stderr, "detector_node: --model '%s': not compiled in; choose one of:", name);
-    for (size_t i = 0U; app_model_at(i) != NULL; i++) {
-        (void)fprintf(stderr, " %s", app_model_at(i)->name);
+    app_unit known;
+    for (size_t i = 0U; app_unit_at(&known, i); i++) {
+        (void)fprintf(stderr, " %s", app_unit_name(&known));
     }
     (void)fprintf(stderr, "\n");
     return EXIT_INPUT;
@@ -149,8 +150,9 @@ enum {
 
 static void list_models(void)
 {
-    for (size_t i = 0U; app_model_at(i) != NULL; i++) {
-        (void)printf("%s %08lx\n", app_model_at(i)->name, (unsigned long)app_model_at(i)->config->model_hash);
+    app_unit known;
+    for (size_t i = 0U; app_unit_at(&known, i); i++) {
+        (void)printf("%s %08lx\n", app_unit_name(&known), (unsigned long)app_unit_hash(&known));
     }
 }
 
@@ -159,8 +161,7 @@ static int take_option(options *self, int option, const char *value)
 {
     switch (option) {
     case OPTION_MODEL:
-        self->model = app_model_find(value);
-        return (self->model != NULL) ? -1 : refuse_model(value);
+        return app_unit_find(&self->unit, value) ? -1 : refuse_model(value);
     case OPTION_INTERFACE:
         self->interface = value;
         return -1;
@@ -211,7 +212,8 @@ static int read_options(options *self, int argc, char **argv)
         {"health", required_argument, NULL, OPTION_HEALTH},
         {NULL, 0, NULL, 0},
     };
-    *self = (options){.model = app_model_at(0U), .interface = "vcan0", .how = HG_START_MOVING, .slack_us = UINT64_MAX};
+    *self = (options){.interface = "vcan0", .how = HG_START_MOVING, .slack_us = UINT64_MAX};
+    (void)app_unit_at(&self->unit, 0U);
     int result = -1;
     int option = 0;
     opterr = 0; /* errors are told here, in the words of all others */
@@ -230,7 +232,7 @@ static int read_options(options *self, int argc, char **argv)
     if ((result == -1) && (optind < argc)) {
         result = refuse("argument", argv[optind], "not expected; see detector_node --help");
     }
-    self->period_us = ((self->period_us == 0U) && (result == -1)) ? self->model->sample_time_us : self->period_us;
+    self->period_us = ((self->period_us == 0U) && (result == -1)) ? app_unit_sample_time_us(&self->unit) : self->period_us;
     self->slack_us = (self->slack_us == UINT64_MAX) ? (self->period_us / 2U) : self->slack_us;
     return result;
 }
@@ -261,12 +263,12 @@ static int refuse_bus(const app *self, hg_status status)
 static hg_status open_bus(app *self)
 {
     hg_hal_filter filter[FILTERS_MAX];
-    const hg_node_config *config = self->options.model->config;
-    for (uint8_t i = 0U; i < config->detector->groups; i++) {
-        filter[i] = (hg_hal_filter){.id = config->message[i].id, .mask = HG_CAN_ID_EXTENDED,
-                                    .flags = config->message[i].flags & HG_CAN_EXTENDED};
+    const uint8_t links = app_unit_links(&self->options.unit);
+    for (uint8_t i = 0U; i < links; i++) {
+        const hg_message *message = app_unit_message(&self->options.unit, i);
+        filter[i] = (hg_hal_filter){.id = message->id, .mask = HG_CAN_ID_EXTENDED, .flags = message->flags & HG_CAN_EXTENDED};
     }
-    const hg_socketcan_options wanted = {.filters = filter, .filter_count = config->detector->groups, .stop_on_signal = true};
+    const hg_socketcan_options wanted = {.filters = filter, .filter_count = links, .stop_on_signal = true};
     const hg_status status = hg_socketcan_open(&self->can, self->options.interface, &wanted);
     if (status == HG_OK) {
         self->hal = hg_socketcan_hal(&self->can);
@@ -305,10 +307,11 @@ static bool finished(const app *self)
 
 static void make_steps(app *self)
 {
-    hg_can_frame frame[2];
-    while ((!finished(self)) && (hg_node_step(self->node, &self->verdict) == HG_OK)) {
-        const bool reply = self->options.lockstep && (self->node->due == 0U);
-        const uint8_t frames = hg_node_report(self->node, &self->verdict, reply, frame);
+    hg_can_frame frame[APP_FRAMES_MAX];
+    app_unit *unit = &self->options.unit;
+    while ((!finished(self)) && (app_unit_step(unit, &self->verdict) == HG_OK)) {
+        const bool reply = self->options.lockstep && (app_unit_due(unit) == 0U);
+        const uint8_t frames = app_unit_report(unit, &self->verdict, reply, frame);
         for (uint8_t i = 0U; i < frames; i++) {
             send_frame(self, &frame[i]);
         }
@@ -329,13 +332,13 @@ static uint64_t samples_behind(const app *self, uint64_t at_us)
 /* The frame's time of arrival says how far ahead of this node its sender can be; without a clock nothing is said. */
 static void look_at_clock(app *self, uint64_t at_us)
 {
-    if (self->options.lockstep || (!self->node->closed) || (at_us < self->closing_us)) {
+    if (self->options.lockstep || (!app_unit_closed(&self->options.unit)) || (at_us < self->closing_us)) {
         return;
     }
     const uint64_t behind = samples_behind(self, at_us);
-    hg_node_expect(self->node, (behind > STAMPS_AHEAD) ? STAMPS_AHEAD : (uint32_t)behind);
+    app_unit_expect(&self->options.unit, (behind > STAMPS_AHEAD) ? STAMPS_AHEAD : (uint32_t)behind);
     if (behind > STAMPS_AHEAD) {
-        hg_node_outage(self->node);
+        app_unit_outage(&self->options.unit);
         self->outages++;
     }
 }
@@ -343,11 +346,12 @@ static void look_at_clock(app *self, uint64_t at_us)
 static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
 {
     look_at_clock(self, at_us);
-    if (hg_node_receive(self->node, frame) == HG_E_BUSY) {
+    const app_unit *unit = &self->options.unit;
+    if (app_unit_receive(unit, frame) == HG_E_BUSY) {
         make_steps(self);
-        (void)hg_node_receive(self->node, frame);
+        (void)app_unit_receive(unit, frame);
     }
-    const bool closing = self->node->due > 0U; /* also one whose numbers could not be used */
+    const bool closing = app_unit_due(unit) > 0U; /* also one whose numbers could not be used */
     make_steps(self);
     if (closing) { /* the next one is expected a period later */
         self->ticking = true;
@@ -366,11 +370,11 @@ static void look_at_deadline(app *self)
     }
     if (self->ticking) {
         if (self->missed < MISSES_MAX) {
-            misses[self->missed] = (miss){.due_us = self->deadline_us, .noticed_us = now_us, .k = self->node->k};
+            misses[self->missed] = (miss){.due_us = self->deadline_us, .noticed_us = now_us, .k = app_unit_k(&self->options.unit)};
         }
         self->missed++;
     }
-    hg_node_overdue(self->node);
+    app_unit_overdue(&self->options.unit);
     make_steps(self);
     const uint64_t behind_us = now_us - self->deadline_us;
     self->deadline_us += self->options.period_us;
@@ -386,14 +390,14 @@ static void print_status(app *self)
     static const char *const plant[] = {"starting", "none", "provisional", "confirmed"};
     static const char *const bus[] = {"absent", "good", "lossy", "stale"};
     static const char *const can[] = {"unknown", "active", "warning", "passive", "off"};
-    const hg_node_config *config = self->options.model->config;
+    const app_unit *unit = &self->options.unit;
     hg_hal_report report;
     hg_hal_state(&self->hal, &report);
     (void)printf("k=%" PRIu32 " plant=%s candidates=0x%" PRIX32, self->verdict.k, plant[self->verdict.plant], self->verdict.candidates);
-    for (uint8_t i = 0U; i < config->detector->groups; i++) {
-        const hg_link_health *health = hg_node_health(self->node, i);
+    for (uint8_t i = 0U; i < app_unit_links(unit); i++) {
+        const hg_link_health *health = app_unit_health(unit, i);
         const unsigned refused = (unsigned)health->crc + health->format + health->repeated + health->early + health->late + health->sequence + health->untrusted + health->numeric;
-        (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", self->options.model->group[i], bus[((unsigned)self->verdict.bus >> (2U * i)) & 0x3U],
+        (void)printf(" %s=%s/good:%u/lost:%u/refused:%u", app_unit_link(unit, i), bus[app_unit_bus(unit, &self->verdict, i)],
                      (unsigned)health->good, (unsigned)health->lost, refused);
     }
     (void)printf(" frames_per_s=%" PRIu32 " missed=%" PRIu64 " outages=%" PRIu64 " unsent=%" PRIu64 " can=%s errors=%" PRIu32
@@ -439,16 +443,20 @@ static bool write_health(const app *self)
     if (file == NULL) {
         return self->options.health == NULL;
     }
-    for (uint8_t i = 0U; i < self->options.model->config->detector->groups; i++) {
-        const hg_link_health *h = hg_node_health(self->node, i);
+    const app_unit *unit = &self->options.unit;
+    for (uint8_t i = 0U; i < app_unit_links(unit); i++) {
+        const hg_link_health *h = app_unit_health(unit, i);
         const struct {
             const char *name;
             uint16_t    count;
         } counters[] = {{"good", h->good}, {"lost", h->lost}, {"crc", h->crc}, {"format", h->format}, {"repeated", h->repeated}, {"early", h->early},
                         {"late", h->late}, {"sequence", h->sequence}, {"untrusted", h->untrusted}, {"numeric", h->numeric}, {"invalid", h->invalid}};
         for (size_t j = 0U; j < (sizeof(counters) / sizeof(counters[0])); j++) {
-            (void)fprintf(file, "%s.%s %u\n", self->options.model->group[i], counters[j].name, (unsigned)counters[j].count);
+            (void)fprintf(file, "%s.%s %u\n", app_unit_link(unit, i), counters[j].name, (unsigned)counters[j].count);
         }
+    }
+    if (unit->tracker != NULL) {
+        (void)fprintf(file, "state.digest %08" PRIx32 "\n", unit->digest);
     }
     return close_file(file);
 }
@@ -497,10 +505,10 @@ static int start(app *self)
     if (opened != HG_OK) {
         return refuse_bus(self, opened);
     }
-    const hg_status started = app_model_start(self->options.model, &self->node, self->options.how);
+    const hg_status started = app_unit_start(&self->options.unit, self->options.how);
     if (started != HG_OK) {
         (void)fprintf(stderr, "detector_node: model '%s' does not start (status %d): generate its tables again\n",
-                      self->options.model->name, (int)started);
+                      app_unit_name(&self->options.unit), (int)started);
         return EXIT_FAILED;
     }
     const uint64_t now_us = hg_hal_now_us(&self->hal);

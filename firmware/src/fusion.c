@@ -598,6 +598,23 @@ hg_real hg_fusion_unwrap(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_rea
     return found;
 }
 
+hg_real hg_fusion_local(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y)
+{
+    const hg_fusion_config *config = self->config;
+    const uint8_t lag = (uint8_t)((self->k - stamp) % STAMPS);
+    for (uint8_t j = 0U; j < config->states; j++) {
+        const hg_real step = (config->origin != NULL) ? config->origin[j] : HG_REAL_ZERO;
+        const hg_real since = (lag < self->held) ? slot_of(self, lag)->shift[j] : HG_REAL_ZERO;
+        self->next[j] = ((hg_real)self->origin[j] * step) - since;
+    }
+    return y - row_times(config, i, self->next);
+}
+
+void hg_fusion_number(hg_fusion *self, uint32_t k)
+{
+    self->k = k;
+}
+
 hg_status hg_fusion_recall(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t spoken, hg_real previous)
 {
     const uint8_t lag = (uint8_t)((self->k - stamp) % STAMPS);

@@ -64,15 +64,17 @@ static bool periodic(const hg_trigger_config *trigger)
     return always;
 }
 
+bool hg_report_valid(const hg_message *verdict, const hg_message *status)
+{
+    const bool valid = (verdict != NULL) && (status != NULL) && hg_frame_valid(verdict) && hg_frame_valid(status);
+    return valid && ((verdict->length == VERDICT_LENGTH) || wide(verdict)) && (status->length == VERDICT_LENGTH) && (verdict->width == 0U) &&
+           (status->width == 0U) && own_header(verdict->e2e) && own_header(status->e2e);
+}
+
 static bool config_valid(const hg_node_config *config)
 {
-    bool valid = (config->detector != NULL) && (config->message != NULL) && (config->verdict != NULL) && (config->status != NULL) &&
-                 (config->heartbeat >= 1U);
-    valid = valid && hg_frame_valid(config->verdict) && hg_frame_valid(config->status);
-    valid = valid && ((config->verdict->length == VERDICT_LENGTH) || wide(config->verdict)) && (config->status->length == VERDICT_LENGTH);
-    valid = valid && (config->verdict->width == 0U) && (config->status->width == 0U) && (config->detector->hold != NULL);
-    valid = valid && (config->closing < config->detector->groups) && (config->detector->groups <= HG_GROUPS_MAX);
-    valid = valid && own_header(config->verdict->e2e) && own_header(config->status->e2e);
+    bool valid = (config->detector != NULL) && (config->message != NULL) && (config->heartbeat >= 1U) && hg_report_valid(config->verdict, config->status);
+    valid = valid && (config->detector->hold != NULL) && (config->closing < config->detector->groups) && (config->detector->groups <= HG_GROUPS_MAX);
     for (uint8_t i = 0U; valid && (i < config->detector->groups); i++) {
         valid = hg_frame_valid(&config->message[i]) && (config->detector->hold[i].trigger != NULL) &&
                 (config->message[i].width == config->detector->hold[i].trigger->width);
@@ -110,7 +112,7 @@ static uint8_t group_of(const hg_node_config *config, const hg_can_frame *frame)
     return group;
 }
 
-static void count_refusal(hg_link_health *health, hg_status status)
+void hg_link_refuse(hg_link_health *health, hg_status status)
 {
     if (status == HG_E_FORMAT) {
         raise16(&health->format, 1U);
@@ -391,7 +393,7 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
         (void)hg_e2e_machine_step(&link->machine, self->config->message[group].e2e->limits, status);
     }
     status = (status == HG_OK) ? book(self, group, frame, &header, &progress) : status;
-    count_refusal(&link->health, status);
+    hg_link_refuse(&link->health, status);
     if ((status != HG_OK) && (status != HG_E_REPEATED)) {
         (void)hg_detector_lose(&self->detector, group);
     }
@@ -490,9 +492,8 @@ static hg_can_frame blank(const hg_message *message)
     return frame;
 }
 
-static void put_verdict(hg_node *self, const hg_verdict *verdict, bool reply, hg_can_frame *frame)
+void hg_verdict_write(const hg_message *message, const hg_verdict *verdict, bool reply, uint8_t counter, hg_can_frame *frame)
 {
-    const hg_message *message = self->config->verdict;
     *frame = blank(message);
     const uint32_t flags = (reply ? 0x10U : 0U) | (verdict->refused ? 0x20U : 0U);
     frame->data[2] = (uint8_t)((uint32_t)verdict->plant | ((uint32_t)verdict->basis << 2U) | flags);
@@ -505,8 +506,7 @@ static void put_verdict(hg_node *self, const hg_verdict *verdict, bool reply, hg
         frame->data[8] = (uint8_t)((verdict->candidates >> 16U) & 0xFFU);
         frame->data[9] = (uint8_t)(verdict->candidates >> 24U);
     }
-    (void)hg_e2e_protect(message->e2e, frame->data, frame->length, self->verdict_counter, (uint8_t)(verdict->k & STAMP_MASK));
-    self->verdict_counter = (self->verdict_counter + 1U) & COUNTER_MASK;
+    (void)hg_e2e_protect(message->e2e, frame->data, frame->length, counter, (uint8_t)(verdict->k & STAMP_MASK));
 }
 
 static uint8_t clipped(uint32_t count)
@@ -514,16 +514,8 @@ static uint8_t clipped(uint32_t count)
     return (count > UINT8_MAX) ? UINT8_MAX : (uint8_t)count;
 }
 
-static void put_status(hg_node *self, const hg_verdict *verdict, hg_can_frame *frame)
+void hg_status_write(const hg_message *message, const hg_verdict *verdict, uint32_t lost, uint32_t refusals, uint8_t counter, hg_can_frame *frame)
 {
-    const hg_message *message = self->config->status;
-    uint32_t lost = 0U;
-    uint32_t refusals = 0U;
-    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
-        const hg_link_health *health = &self->link[i].health;
-        lost += health->lost;
-        refusals += (uint32_t)health->crc + health->format + health->early + health->late + health->sequence + health->untrusted + health->numeric;
-    }
     *frame = blank(message);
     frame->data[2] = (uint8_t)(verdict->model_hash & 0xFFU);
     frame->data[3] = (uint8_t)((verdict->model_hash >> 8U) & 0xFFU);
@@ -531,8 +523,20 @@ static void put_status(hg_node *self, const hg_verdict *verdict, hg_can_frame *f
     frame->data[5] = (uint8_t)((verdict->model_hash >> 24U) & 0xFFU);
     frame->data[6] = clipped(lost);
     frame->data[7] = clipped(refusals);
-    (void)hg_e2e_protect(message->e2e, frame->data, frame->length, self->status_counter, (uint8_t)(verdict->k & STAMP_MASK));
-    self->status_counter = (self->status_counter + 1U) & COUNTER_MASK;
+    (void)hg_e2e_protect(message->e2e, frame->data, frame->length, counter, (uint8_t)(verdict->k & STAMP_MASK));
+}
+
+/* The status frame of all links together. */
+static void put_status(const hg_node *self, const hg_verdict *verdict, hg_can_frame *frame)
+{
+    uint32_t lost = 0U;
+    uint32_t refusals = 0U;
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        const hg_link_health *health = &self->link[i].health;
+        lost += health->lost;
+        refusals += (uint32_t)health->crc + health->format + health->early + health->late + health->sequence + health->untrusted + health->numeric;
+    }
+    hg_status_write(self->config->status, verdict, lost, refusals, self->status_counter, frame);
 }
 
 uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_can_frame *frame)
@@ -544,7 +548,8 @@ uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_
     uint8_t frames = 0U;
     self->silence++;
     if (changed || beat || reply) {
-        put_verdict(self, verdict, (!changed) && (!beat), &frame[0]);
+        hg_verdict_write(self->config->verdict, verdict, (!changed) && (!beat), self->verdict_counter, &frame[0]);
+        self->verdict_counter = (self->verdict_counter + 1U) & COUNTER_MASK;
         frames = 1U;
     }
     if (changed || beat) {
@@ -554,6 +559,7 @@ uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_
     if (beat) {
         self->silence = 0U;
         put_status(self, verdict, &frame[1]);
+        self->status_counter = (self->status_counter + 1U) & COUNTER_MASK;
         frames = 2U;
     }
     return frames;

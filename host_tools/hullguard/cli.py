@@ -256,13 +256,26 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     }
 
 
+def _of_kind(args: argparse.Namespace) -> Callable[[argparse.Namespace], int] | None:
+    """What takes models of a kind that has commands of its own."""
+    if args.command == "inject" or not getattr(args, "model", None):
+        return None
+    from hullguard.model import fusion
+
+    if fusion.kind_of(args.model) != fusion.KIND:
+        return None
+    from hullguard.fusion_commands import dispatch
+
+    return dispatch
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; its exit status. Errors are one line on stderr that names the cause and the cure."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         args = build_parser().parse_args(given)  # what it imports takes long enough for a Ctrl-C
         args.arguments = given
-        return _commands()[args.command](args)
+        return (_of_kind(args) or _commands()[args.command])(args)
     except HullguardError as error:
         print(f"hullguard: {error}", file=sys.stderr)
         return error.status

@@ -27,6 +27,7 @@ from hullguard.campaign.case import Case, setup_of
 from hullguard.campaign.chunks import Chunks
 from hullguard.campaign.result import campaign_result, describe, write_results
 from hullguard.campaign.table import check_table, table, write_table
+from hullguard.codegen.c import Named
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native, Plant, Recording, Verdict
 from hullguard.design import store, uio_sensors
@@ -364,7 +365,7 @@ def _bus(args: argparse.Namespace, made: Design, native: Native, options: dict[s
         raise BusError("a virtual bus lives inside one process and has no second end; use --bus inprocess")
     if any(m.flags & candump.FD for m in [*(g.message for g in native.tables.groups), native.tables.verdict, native.tables.status]):
         options.setdefault("fd", True)
-    with opened(**options) as link, _node(args, made, options, pace.lockstep, start):
+    with opened(**options) as link, launched(args, made, options, pace.lockstep, start):
         name = choose.describe(str(options.get("channel"))) if options.get("interface") == "socketcan" else f"{options.get('interface')}:{options.get('channel')}"
         yield OnCan(link, native, pace), pace, name
 
@@ -382,8 +383,8 @@ def make_speed(text: str) -> float:
     return speed
 
 
-def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any], lockstep: bool, start: int) -> list[str]:
-    """The C node where it has this very model compiled in, otherwise the same library behind python-can."""
+def node_command(args: argparse.Namespace, made: Named, options: dict[str, Any], lockstep: bool, start: int, more: Sequence[str] = ()) -> list[str]:
+    """The C node where it has this very model compiled in, with `more` options, otherwise the same library behind python-can."""
     flags = (["--lockstep"] if lockstep else []) + (["--rest"] if start == REST else [])
     if options.get("interface") == "socketcan" and args.real in ("f32", "f64"):
         binary = choose.NODE if args.real == "f32" else choose.NODE.with_name("detector_node_f64")
@@ -391,7 +392,7 @@ def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any]
             listed = subprocess.run([str(binary), "--list"], capture_output=True, text=True, check=False).stdout.split("\n")
             if f"{made.model.name} {made.tables.hash:08x}" in listed:
                 command = [str(binary), "--model", made.model.name, "--interface", str(options["channel"])]
-                return command + flags
+                return [*command, *flags, *more]
     command = [sys.executable, "-m", "hullguard", "detect", args.model, "--quiet", "--ready", "--real", args.real]
     command += [x for text in args.set for x in ("--set", text)] + (["--scenario", args.scenario] if getattr(args, "scenario", None) else [])
     for key, value in options.items():
@@ -405,9 +406,9 @@ def node_command(args: argparse.Namespace, made: Design, options: dict[str, Any]
 
 
 @contextlib.contextmanager
-def _node(args: argparse.Namespace, made: Design, options: dict[str, Any], lockstep: bool, start: int) -> Iterator[None]:
+def launched(args: argparse.Namespace, made: Named, options: dict[str, Any], lockstep: bool, start: int, more: Sequence[str] = ()) -> Iterator[None]:
     """A detector node as a process of its own, ready before the first frame and ended after the last."""
-    command = node_command(args, made, options, lockstep, start)
+    command = node_command(args, made, options, lockstep, start, more)
     say(args, f"node: {Path(command[0]).name if 'hullguard' not in command else 'hullguard detect'}, a process of its own")
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     try:
@@ -728,6 +729,10 @@ def run_report(args: argparse.Namespace) -> int:
 
         say(args, f"report: {write_campaign_report(directory)}")
         return 0
+    from hullguard.fusion_commands import report
+
+    if (status := report(args, directory)) is not None:
+        return status
     _report(args, directory)
     if args.png:
         from hullguard.report.run_report import write_picture

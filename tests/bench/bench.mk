@@ -9,7 +9,7 @@ bench-speed: lib ## plant samples per second and core in a campaign, of every sh
 
 BENCH       := $(BUILD)/bench
 BENCH_REALS := f32 q31
-MODELS      := $(filter-out %_uio,$(patsubst firmware/models/%.c,%,$(MODEL_SRC)))
+MODELS      := $(filter-out %_uio $(FUSION_MODELS),$(patsubst firmware/models/%.c,%,$(MODEL_SRC)))
 RECORDER    := tests/bench/record.py
 
 # This machine is a target too, and has a C library as powerpc has.

@@ -3,11 +3,13 @@
 # A number that grew fails; make size-budget takes today's numbers for the budget, to be looked at in the difference and committed.
 
 SIZE_PARTS := detector node sensor
+FUSION_PARTS := tracker tracker_sensor# of a fusion filter, which is for float types
 
 # The part of it in `make check`: two instruction sets, with an FPU and without.
 SIZE_QUICK := cortex_m4f rv32imac
 
-size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(filter-out $(NOT_$(r)),$(MODELS)),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf))))
+size_elfs = $(foreach t,$(1),$(foreach r,$(BENCH_REALS),$(foreach m,$(filter-out $(NOT_$(r)),$(MODELS)),$(SIZE_PARTS:%=$(BENCH)/$(t)-$(r)/$(m)/%.elf)))\
+                    $(foreach m,$(FUSION_MODELS),$(FUSION_PARTS:%=$(BENCH)/$(t)-f32/$(m)/%.elf)))
 size_cross = $(foreach t,$(1),$(t)=$(CROSS_$(t)))
 size_run  = $(PY) tests/bench/size.py --budget tests/bench/budget.toml --cross '$(call size_cross,$(1))' $(2) $(call size_elfs,$(1))
 
@@ -44,3 +46,18 @@ $(eval $(call objects,$(BENCH)/$(1)-$(2),tests/bench/size_port.c,$$(call bench_c
 $(foreach m,$(filter-out $(NOT_$(2)),$(MODELS)),$(foreach p,$(SIZE_PARTS),$(eval $(call size_program,$(1),$(2),$(m),$(p)))))
 endef
 $(foreach r,$(BENCH_REALS),$(foreach t,$(TARGETS),$(eval $(call size_target,$(t),$(r)))))
+
+# $(call size_fusion,TARGET,MODEL): the library as that model needs it, its tables, and its programs.
+define size_fusion
+$(eval $(call objects,$(BENCH)/$(1)-f32/$(2),$(LIB_SRC),$$(call bench_model,$(1),f32,$(2))))
+OBJECTS += $(BENCH)/$(1)-f32/$(2)/tables.o $(FUSION_PARTS:%=$(BENCH)/$(1)-f32/$(2)/size_%.o)
+$(BENCH)/$(1)-f32/$(2)/tables.o: firmware/models/$(2).c Makefile
+	@mkdir -p $$(@D)
+	$$(Q)$$(call bench_model,$(1),f32,$(2)) $$(WARN) $$(INCLUDE) $$(DEPEND) -c $$< -o $$@
+$(FUSION_PARTS:%=$(BENCH)/$(1)-f32/$(2)/size_%.o): $(BENCH)/$(1)-f32/$(2)/%.o: tests/bench/%.c Makefile
+	@mkdir -p $$(@D)
+	$$(Q)$$(call bench_model,$(1),f32,$(2)) $$(WARN) $$(INCLUDE) -Itests/bench $$(DEPEND) -include firmware/models/$(2).h -Dsize_storage=hg_$(2)_tracker -Dsize_start=hg_$(2)_tracker_start -c $$< -o $$@
+$(FUSION_PARTS:%=$(BENCH)/$(1)-f32/$(2)/%.elf): $(BENCH)/$(1)-f32/$(2)/%.elf: $(BENCH)/$(1)-f32/$(2)/size_%.o $(call bench_objects,$(1)-f32,$(LIB_SRC:%=$(2)/%) $(2)/tables.o $(START_$(1)) $(IMAGE_SRC) tests/bench/size_port.c) hal/start/image.ld
+	$$(Q)$$(call cross_cc,$(1)) $$(call image_link,$(1)) -Wl,-Map=$$(@:.elf=.map) -nostdlib -o $$@ $$(filter %.o,$$^) -lgcc
+endef
+$(foreach t,$(TARGETS),$(foreach m,$(FUSION_MODELS),$(eval $(call size_fusion,$(t),$(m)))))

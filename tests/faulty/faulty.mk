@@ -13,7 +13,7 @@ $(FAULTY_LIB)/libhullguard_f32.so: $(patsubst %.c,$(BUILD)/faulty/shared/%.o,$(L
 $(FAULTY_LIB)/hullguard_f32.i: $(BUILD)/lib/hullguard_f32.i $(FAULTY_LIB)/libhullguard_f32.so
 	@cp $< $@
 
-FAULTY_NODE_SRC := $(LIB_SRC) $(MODEL_SRC) $(wildcard hal/socketcan/*.c) firmware/apps/models.c firmware/apps/detector_node.c
+FAULTY_NODE_SRC := $(LIB_SRC) $(MODEL_SRC) $(wildcard hal/socketcan/*.c) $(patsubst %,firmware/apps/%.c,models tracker_models units detector_node)
 $(eval $(call objects,$(BUILD)/faulty/node,$(FAULTY_NODE_SRC),$$(CC) $$(SANITIZE) -Ifirmware/apps -Ihal/socketcan $(REAL_FLAG_f32)))
 $(FAULTY_NODE): $(FAULTY_NODE_SRC:%.c=$(BUILD)/faulty/node/%.o)
 	$(Q)$(CC) -fsanitize=undefined -o $@ $^

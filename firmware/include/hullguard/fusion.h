@@ -229,6 +229,14 @@ hg_status hg_fusion_receive(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t c
  *  Result: for hg_fusion_receive() or hg_fusion_recall(); y itself when the sample is not held. Cost: one division. */
 hg_real hg_fusion_unwrap(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y, hg_real period);
 
+/** An absolute measurement as hg_fusion_receive() and hg_fusion_due() take it: relative to the origin as it was when its sample was opened; the present one where that
+ *  is not held. One that wraps round goes through hg_fusion_unwrap() next, and then its period is free.
+ *  @param[in] i, stamp  as in hg_fusion_receive()  @param[in] y  absolute, signal units. Cost: 2 n multiplications. */
+hg_real hg_fusion_local(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y);
+
+/** Number the open sample, of which nothing is booked yet: stamps count from it. @param[in] k  its index. Constant time. */
+void hg_fusion_number(hg_fusion *self, uint32_t k);
+
 /** Book what a frame says of its sensor's past.
  *  @param[in] stamp     sample of that frame modulo 16
  *  @param[in] spoken    bit b: the sensor has sent a frame b + 1 samples before it; 0: it was silent by its trigger

@@ -29,5 +29,6 @@
 #include "hullguard/can.h"
 #include "hullguard/frame.h"
 #include "hullguard/node.h"
+#include "hullguard/tracker.h"
 
 #endif

@@ -187,6 +187,18 @@ uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_
  *  @retval HG_OK  @retval HG_E_FORMAT  @retval HG_E_CRC */
 hg_status hg_verdict_read(const hg_message *message, const hg_can_frame *frame, hg_verdict *verdict, bool *reply);
 
+/** Are these messages a verdict and a status frame as frame.h draws them? */
+bool hg_report_valid(const hg_message *verdict, const hg_message *status);
+
+/** Write a verdict frame. @param[in] reply  sent only to answer a tick in lockstep  @param[in] counter  sequence counter of the frame, 0 .. 15 */
+void hg_verdict_write(const hg_message *message, const hg_verdict *verdict, bool reply, uint8_t counter, hg_can_frame *frame);
+
+/** Write a status frame. @param[in] verdict  its k and model_hash are sent  @param[in] lost, refusals  frames since the start */
+void hg_status_write(const hg_message *message, const hg_verdict *verdict, uint32_t lost, uint32_t refusals, uint8_t counter, hg_can_frame *frame);
+
+/** Count a frame that was refused with this status; others are not counted here. */
+void hg_link_refuse(hg_link_health *health, hg_status status);
+
 /** Health of one group's link. @param[in] group  0 .. groups - 1 */
 const hg_link_health *hg_node_health(const hg_node *self, uint8_t group);
 

@@ -103,7 +103,7 @@ class Study:
     @cached_property
     def always(self) -> Filter:
         """For sensors that send whatever their trigger says: silence says nothing."""
-        return Filter((design.plain_table(self.model, [1.0] * SENSORS),), heartbeat=1)
+        return Filter((design.plain_table(self.model, [1.0] * self.model.sensors),), heartbeat=1)
 
     def run(self, chosen: Filter, sensor: Filter | None = None, runs: int = 0, **case: Any) -> Outcome:
         """A batch."""
@@ -180,14 +180,15 @@ def controls(study: Study) -> Iterator[Check]:
 
 def stochastic(study: Study, level: float) -> tuple[Filter, dict[str, Any]]:
     """Closed-loop stochastic trigger, uniform; larger levels send more, hence the inverse."""
-    share = [[design.beta_stochastic(1.0 / level, p)] * SENSORS for p in design.LOSS_RATES]
-    return Filter((design.plain_table(study.model, [1.0 / level] * SENSORS, share),), "stochastic", **NEVER), {}
+    sensors = study.model.sensors
+    share = [[design.beta_stochastic(1.0 / level, p)] * sensors for p in design.LOSS_RATES]
+    return Filter((design.plain_table(study.model, [1.0 / level] * sensors, share),), "stochastic", **NEVER), {}
 
 
 def windowed(study: Study, detrended: bool, tau: float) -> tuple[Filter, dict[str, Any]]:
     """Variance trigger at the sensors, var > tau R, heartbeat of 10 samples."""
     levels = tuple(design.variance_level(tau * r, WINDOW, CONVERTER, detrended) for r in study.model.R)
-    chosen = Filter((design.plain_table(study.model, [1.0] * SENSORS),), "own")
+    chosen = Filter((design.plain_table(study.model, [1.0] * study.model.sensors),), "own")
     return chosen, {"windows": Windows(WINDOW, detrended, levels, CONVERTER)}
 
 

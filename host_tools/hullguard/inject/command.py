@@ -21,6 +21,7 @@ from hullguard.inject.directive import Directive, parse_directive, read_directiv
 from hullguard.inject.engine import Injector, Sent
 from hullguard.inject.labels import Ledger
 from hullguard.inject.options import declared
+from hullguard.model import fusion
 
 BUS_KEYS = ("channel", "interface", "bitrate", "fd", "data_bitrate", "timing")
 
@@ -78,6 +79,10 @@ def _codec(args: argparse.Namespace) -> Codec:
         if args.set:
             raise InputError("--set changes a model, and a DBC is none; name the model instead")
         return read_codec(Path(args.model))
+    if fusion.kind_of(args.model) == fusion.KIND:
+        from hullguard.fusion_commands import codec
+
+        return codec(args)
     return design_codec(prepared(args)[1])
 
 

@@ -23,7 +23,7 @@ class FaultSpec:
     end: int | None  # first sample after the fault
 
     def __str__(self) -> str:
-        size = "" if self.kind == "freeze" else f":{self.size:g}"
+        size = "" if self.kind in ("freeze", "dead") else f":{self.size:g}"
         return f"{self.name}:{self.kind}{size}@{self.start}" + ("" if self.end is None else f"..{self.end}")
 
 

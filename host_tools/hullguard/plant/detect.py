@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from hullguard.bus import candump
 from hullguard.bus.link import CanLink
@@ -21,9 +22,14 @@ class Detector:
     With `period_s` the time stamps of the closing frames are watched: a stamp tells a gap of up to 7 samples, a longer one is an outage.
     """
 
+    node: Node
+
     def __init__(self, native: Native, start: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None = None) -> None:
-        self.node = Node(native, start)
-        self._closing = native.tables.groups[native.tables.closing].message.id
+        self.begin(Node(native, start), native.tables.groups[native.tables.closing].message.id, lockstep, send, watch, period_s)
+
+    def begin(self, node: Any, closing: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None) -> None:
+        """With a node of any kind that has the methods of Node; `closing` is the identifier of the frame that closes a sample."""
+        self.node, self._closing = node, closing
         self._lockstep, self._send, self._watch, self._period = lockstep, send, watch, period_s
         self._closed_at: float | None = None
         self._steps_since = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,8 @@ from hullguard.model.table import Array
 TIME = "time_s"
 
 
-def read_recording(path: Path, model: Model) -> Array:
-    """Samples x signals in the model's order. Missing columns, gaps, text, NaN and uneven time are refused with their place."""
+def read_columns(path: Path, names: Sequence[str], period: float, who: str) -> Array:
+    """Rows x names. Missing columns, gaps, text, NaN and uneven time are refused with their place; `who` needs the columns."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(file))
@@ -26,17 +27,22 @@ def read_recording(path: Path, model: Model) -> Array:
         raise InputError(f"{path.name}: the file is empty")
     header = [c.strip() for c in rows[0]]
     columns = {}
-    for s in model.signals:
-        if header.count(s.name) != 1:
-            problem = "is missing" if s.name not in header else "is there twice"
-            raise InputError(f"{path.name}: column '{s.name}' {problem}; the model {model.name} needs {', '.join(x.name for x in model.signals)}")
-        columns[s.name] = header.index(s.name)
+    for name in names:
+        if header.count(name) != 1:
+            problem = "is missing" if name not in header else "is there twice"
+            raise InputError(f"{path.name}: column '{name}' {problem}; the model {who} needs {', '.join(names)}")
+        columns[name] = header.index(name)
     body = [(i, r) for i, r in enumerate(rows[1:], 2) if any(c.strip() for c in r)]
     if not body:
         raise InputError(f"{path.name}: no rows below the header")
     if TIME in header:
-        _check_time(path, body, header.index(TIME), model.sample_time_s)
-    data = np.array([[_number(path, line, r, s, c) for s, c in columns.items()] for line, r in body])
+        _check_time(path, body, header.index(TIME), period)
+    return np.array([[_number(path, line, r, s, c) for s, c in columns.items()] for line, r in body])
+
+
+def read_recording(path: Path, model: Model) -> Array:
+    """Samples x signals in the model's order. Missing columns, gaps, text, NaN and uneven time are refused with their place."""
+    data = read_columns(path, [s.name for s in model.signals], model.sample_time_s, model.name)
     # A reading that shows an earlier row exists only from there on: sample 0 is the first row at which all do.
     latest = max(s.csv_delay for s in model.signals)
     if latest >= len(data):
