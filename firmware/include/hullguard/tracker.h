@@ -30,6 +30,10 @@
 #include "hullguard/consistency.h"
 #include "hullguard/node.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #if HG_REAL_F32 || HG_REAL_F64
 
 typedef struct {                     /* flash: one a sensor */
@@ -163,4 +167,8 @@ hg_status hg_fusion_sender_start(hg_fusion_sender *self, const hg_tracker *track
 hg_status hg_fusion_sender_step(hg_fusion_sender *self, hg_real y, hg_real dice, bool own, hg_can_frame *frame);
 
 #endif
+#ifdef __cplusplus
+}
+#endif
+
 #endif
