@@ -1,5 +1,6 @@
 #include "models.h"
 
+#include "cubic_suspension.h"
 #include "openacc.h"
 #include "platoon.h"
 #include "platoon_bank.h"
@@ -9,7 +10,7 @@
 #include <string.h>
 
 /* One line a model: its name as its generated header writes it, in lower and in upper case. */
-#define MODELS(X) X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC) X(suspension, SUSPENSION) X(suspension_published, SUSPENSION_PUBLISHED)
+#define MODELS(X) X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC) X(suspension, SUSPENSION) X(suspension_published, SUSPENSION_PUBLISHED) X(cubic_suspension, CUBIC_SUSPENSION)
 
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_node name##_node;                                        \

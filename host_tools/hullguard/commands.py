@@ -37,6 +37,7 @@ from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_ove
 from hullguard.model.schema import FAULTS_MAX, Scenario
 from hullguard.plant.detect import Detector, from_bus, from_log
 from hullguard.plant.estimates import estimate_facts, estimated, write_estimates
+from hullguard.plant.filters import Followed, filter_facts, filter_words, filtered, write_filters
 from hullguard.plant.recording import read_recording
 from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, candidate_names, spoken, summary, write_files
 from hullguard.plant.unknown import Continuous
@@ -188,6 +189,8 @@ def run_design(args: argparse.Namespace) -> int:
     for i, g in enumerate(made.generators):
         found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
         say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
+    for p, name in zip(made.tables.polynomials, made.judges[len(made.judges) - len(made.tables.polynomials) :], strict=True):
+        say(args, f"  {name}: {p.lifted} lifted states, {4 * p.reals} bytes of RAM in float32; plain threshold kappa = {p.kappa:.3g}, J2 {p.joint**0.5:.3g}, drift {p.drift**0.5:.3g}")
     for i, u in enumerate(made.uios):
         radii = ", ".join(f"{name} {r:.3g}" for name, r in zip(u.names, u.tables.steady, strict=True))
         say(args, f"  unknown-input observer {i + 1}: radii {radii}")
@@ -225,6 +228,8 @@ def emulated(native: Native, made: Design, scenario: Scenario, faults: Sequence[
     """The emulated plant of a scenario."""
     if made.model.uios:
         return Continuous(made, native, scenario, faults, samples, seed)
+    if made.model.polynomials:
+        return Followed(native, made, scenario.reference, faults, seed)
     return Plant(native, made, scenario.reference, faults, seed)
 
 
@@ -281,10 +286,14 @@ def _drive(
     result = summary(made, native, trace, faults, facts)
     found = estimated(made, native.library, trace, start, source.emulated if isinstance(source, Continuous) else None)
     result |= estimate_facts(found) if found else {}
+    filters = filtered(made, native.library, trace, source.states if isinstance(source, Followed) else None)
+    result |= filter_facts(filters, faults) if filters else {}
     if out is not None:
         write_files(out, made, native, trace, faults, result)
         if found:
             write_estimates(out, made, found)
+        if filters:
+            write_filters(out, made, filters)
         from hullguard.codegen.dbc import emit_dbc
 
         (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
@@ -435,6 +444,8 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
             say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}" + _narrowed(f))
     for v in result.get("isolation", []):
         say(args, _isolated(v))
+    for row in result.get("filters", []):
+        say(args, filter_words(row))
     alarms = result["false_alarms"]
     say(args, f"false alarms before the fault: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J {result['margin_max']:.3f}")
 

@@ -23,7 +23,7 @@ from hullguard.design.predict import Bounds, predict_table, predicted_groups
 from hullguard.design.protection import LISTED, NONE
 from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
-from hullguard.design.statistic import Known, StatisticTable, statistic_checks, statistic_table
+from hullguard.design.statistic import StatisticTable, known_of, statistic_checks, statistic_table
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import (
     GeneratorTable,
@@ -300,7 +300,7 @@ def finish(model: Model, stored: Stored) -> Design:
     values = np.array([largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
     uios = tuple(uio_generator.finish(model, i, u, derived.usual, values, stored.state_range) for i, u in enumerate(stored.uios))
     generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers))) + tuple(_uio_generator(model, u) for u in uios)
-    known = _known(groups, derived)
+    known = known_of(groups, derived.usual.tolist())
     polynomials = tuple(statistic_table(model, spec, known) for spec in model.polynomials)
     tables = _tables(model, groups, generators, derived, _banks(model, stored, derived), polynomials)
     _unique_ids(model, tables)
@@ -530,12 +530,6 @@ def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, .
     if len(model.observers) + len(made) > GENERATORS_MAX:
         raise InputError(f"{model.path.name}: {len(model.observers)} observers and {len(made)} banks, {GENERATORS_MAX} are possible; isolate fewer faults")
     return tuple(made)
-
-
-def _known(groups: tuple[GroupTable, ...], derived: Derived) -> Known:
-    """Radii of the sent signals."""
-    half = [s.half for g in groups for s in g.signals]
-    return Known(half, derived.usual[: len(half)].tolist())
 
 
 def _tables(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from hullguard.design.polynomial import Exponents, Map, Polynomial
 from hullguard.errors import InputError
 from hullguard.model.polynomial import FilterSpec, Nonlinear
 from hullguard.model.schema import Model
+
+if TYPE_CHECKING:
+    from hullguard.design.tables import GroupTable
 
 STATISTICS = ("plain", "joint", "drift")
 UNIT = 5.0  # standard deviations, about
@@ -145,6 +149,12 @@ class Known:
 
     half: Sequence[float]  # error of a value that has just arrived
     usual: Sequence[float]  # radius most of the time
+
+
+def known_of(groups: Sequence[GroupTable], usual: Sequence[float]) -> Known:
+    """From the tables of all groups; `usual` radii of the whole signal vector."""
+    half = [s.half for g in groups for s in g.signals]
+    return Known(half, usual[: len(half)])
 
 
 def statistic_table(model: Model, spec: FilterSpec, known: Known) -> StatisticTable:

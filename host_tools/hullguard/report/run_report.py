@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from hullguard.design.judges import BANK
 from hullguard.errors import InputError
 from hullguard.model.detector import PUBLISHED
-from hullguard.report import published, uio_section
+from hullguard.report import polynomial_section, published, uio_section
 from hullguard.report import run_figures as draw
 from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
 from hullguard.report.run_data import FaultRun, Run, read_run
@@ -58,7 +58,7 @@ def write_run_report(directory: Path) -> Path:
     """Read a finished run's directory and write report.html into it."""
     run = read_run(directory)
     with mpl.rc_context(RC):
-        text = page(f"Run of {run.info['model']}", _body(run, uio_section.read_estimates(directory, run.info)))
+        text = page(f"Run of {run.info['model']}", _body(run, uio_section.read_estimates(directory, run.info), polynomial_section.read_filters(directory, run.info)))
     path = directory / "report.html"
     _write(path, text.encode())
     return path
@@ -85,13 +85,14 @@ def _write(path: Path, data: bytes) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _body(run: Run, estimates: Sequence[uio_section.Estimate]) -> Iterator[str]:
+def _body(run: Run, estimates: Sequence[uio_section.Estimate], filters: Sequence[polynomial_section.Filter]) -> Iterator[str]:
     yield from _summary(run)
     whole = draw.whole(run)
     shown, hidden, judges = draw.chosen_residuals(run)
     if run.before:
         yield from published.section(run)
     yield from uio_section.section(run, estimates)
+    yield from polynomial_section.section(run, filters)
 
     yield "<h2>Residuals and thresholds</h2>"
     left = ""
