@@ -14,5 +14,6 @@
 #define HG_WITH_BANK 0
 #define HG_WITH_PREDICT 0
 #define HG_WITH_MISMATCH 0
+#define HG_WITH_POLYNOMIAL 0
 
 #endif

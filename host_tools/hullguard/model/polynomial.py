@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 KIND = "polynomial"
 EXPANSION_MAX = 5
 KAPPA = 4.47  # 1 / sqrt(5 %): Chebyshev
-NOISES: dict[str, Callable[[float], Noise]] = {"normal": normal, "exponential": exponential, "uniform": uniform, "laplace": laplace}
+NOISES: dict[str, Callable[[float], Noise]] = {"normal": normal, "uniform": uniform, "laplace": laplace}
 
 
 @dataclass(frozen=True)
@@ -166,11 +166,13 @@ def _row(given: object, where: str, variables: Sequence[str], parameters: dict[s
 
 def _noise(table: Table, name: str, path: Path) -> Noise:
     t = table.table(name)
-    kind = t.text("kind", choices=[*NOISES, "student", "two-point", "samples"])
+    kind = t.text("kind", choices=[*NOISES, "exponential", "student", "two-point", "samples"])
     if kind == "samples":
         made = _sampled(t, path)
     elif kind == "two-point":
         made = two_point(t.number("deviation", 1e-30), t.number("probability", 1e-3, 1.0 - 1e-3))
+    elif kind == "exponential":
+        made = exponential(t.number("deviation", 0.0) * (-1.0 if t.text("tail", "right", ["left", "right"]) == "left" else 1.0))
     elif kind == "student":
         made = student(t.number("deviation", 1e-30), t.number("degrees_of_freedom", 2.001, 1e6))
     else:
