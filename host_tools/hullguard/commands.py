@@ -606,6 +606,8 @@ def _campaign_cases(args: argparse.Namespace, keep: Path | None) -> list[Case]:
             raise InputError(f"--plants: model {made.model.name} has no interval to draw from; give a parameter as {{ value = 1.0, pm = 0.1 }}")
         if attack and min((f.start for f in faults), default=1) < 1:
             raise InputError("--attack aims at samples before the first fault: let it start at sample 1 or later")
+        if attack:
+            _need_bounds(made.model, "--attack")
         base = Case(setup_of(made, args.real), samples, scenario.reference, (), args.seed, attack=attack, plants=args.plants, varied=tuple(varied.items()))
         cases += [replace(base, faults=f, loss=p, burst=b) for f in grid.fault_sets(faults, args.each_fault, sizes) for p in losses for b in bursts]
     return cases
@@ -683,6 +685,12 @@ def _campaign_expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
     return 0
 
 
+def _need_bounds(model: Model, what: str) -> None:
+    """Refuse what reasons with the bounds of a linear plant."""
+    if model.polynomials:
+        raise InputError(f"{what}: model {model.name} has noise with a distribution and no bounds to choose within; choose a linear model")
+
+
 def run_limit(args: argparse.Namespace) -> int:
     """`hullguard limit`."""
     from hullguard.campaign.limit_study import RUNS_TASK, LimitJob, limit_study
@@ -697,6 +705,7 @@ def run_limit(args: argparse.Namespace) -> int:
     faults, sizes = list(dict.fromkeys(args.fault or known)), _sizes(args.size)
     if not faults:
         raise InputError(f"model {model.name} has no faults to look for: add [[faults]]")
+    _need_bounds(model, "limit")
     job = LimitJob(made.model, made.stored, args.real, args.window, args.samples or scenario.samples, scenario.reference, args.seed)
     with progress(args, "limit") as tick:
         done, total = [0], len(faults) * len(sizes) * -(-args.runs // RUNS_TASK)

@@ -73,7 +73,7 @@ def section(run: Run, every: Sequence[Filter]) -> Iterator[str]:
     yield _comparison(every)
     first = [f for f in every if f.number == every[0].number]
     if all(t is not None for f in first for _, _, t in f.states.values()):
-        caption = f"Estimate less truth, and ± {BAND:g} standard deviations as the filter claims them, degree by degree."
+        caption = f"Estimate less truth as large as it was before a fault, and ± {BAND:g} standard deviations as the filter claims them, degree by degree."
         yield picture(error_figure(run, first), "filters-errors", "Errors of the estimates", caption)
     yield picture(
         ratio_figure(run, first), "filters-statistics", "Statistics relative to their levels", "r/J of each statistic and degree; above 1 it is an alarm of that filter. Square roots of J2² and of the drift."
@@ -110,7 +110,8 @@ def error_figure(run: Run, every: Sequence[Filter]) -> Figure:
     sheet, axes = _sheet(run, len(names) * len(every))
     for i, name in enumerate(names):
         errors = [f.states[name][0] - (f.states[name][2] if f.states[name][2] is not None else 0.0) for f in every]
-        settled = max(float(np.quantile(np.abs(e[len(e) // 10 :]), 0.995)) for e in errors)
+        healthy = slice(len(run.k) // 20, min((f.start for f in run.faults), default=len(run.k)))
+        settled = max((float(np.abs(e[healthy]).max(initial=0.0)) for e in errors), default=0.0) * 1.15  # what a fault does may leave the panel
         widest = max(float(np.median(f.states[name][1])) for f in every) * BAND * 1.3
         for j, (f, error) in enumerate(zip(every, errors, strict=True)):
             ax, colour, deviation = axes[i * len(every) + j], COLOURS[f.degree - 1], f.states[name][1]
