@@ -539,7 +539,7 @@ static hg_status step_polynomials(hg_detector *self, hg_evidence *evidence)
 static hg_basis basis_of(const hg_detector *self, hg_plant plant)
 {
     const uint8_t sets = (uint8_t)(self->config->generators + self->config->banks);
-    bool bounded = (POLYNOMIALS(self->config) == 0U) || ((sets > 0U) && (plant <= HG_PLANT_NONE));
+    bool bounded = (sets > 0U) && (plant <= HG_PLANT_NONE);
     for (uint8_t g = 0U; g < sets; g++) {
         bounded = bounded || (self->memory.alarm[g].state == plant);
     }

@@ -190,7 +190,8 @@ def run_design(args: argparse.Namespace) -> int:
         found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
         say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
     for p, name in zip(made.tables.polynomials, made.judges[len(made.judges) - len(made.tables.polynomials) :], strict=True):
-        say(args, f"  {name}: {p.lifted} lifted states, {4 * p.reals} bytes of RAM in float32; plain threshold kappa = {p.kappa:.3g}, J2 {p.joint**0.5:.3g}, drift {p.drift**0.5:.3g}")
+        levels = f"kappa {p.kappa:.3g}, J2 {p.joint**0.5:.3g}, drift {p.drift**0.5:.3g}"
+        say(args, f"  {name}: {p.lifted} lifted states, {4 * p.reals} bytes of RAM in float32; levels: {levels}")
     for i, u in enumerate(made.uios):
         radii = ", ".join(f"{name} {r:.3g}" for name, r in zip(u.names, u.tables.steady, strict=True))
         say(args, f"  unknown-input observer {i + 1}: radii {radii}")

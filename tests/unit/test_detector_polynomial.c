@@ -171,6 +171,19 @@ static void a_filter_alone_is_statistical_always(void **state)
     assert_int_equal(HG_BASIS_STATISTICAL, r.finding.basis);
 }
 
+static void all_must_have_settled(void **state)
+{
+    (void)state;
+    const hg_detector_config c = both_config();
+    (void)memset(&r, 0, sizeof r);
+    const hg_detector_memory memory = memory_of();
+    assert_status(HG_OK, hg_detector_start(&r.self, &c, &memory, HG_START_MOVING));
+    for (int k = 0; k < 6; k++) {
+        rest(1);
+        assert_int_equal((k >= 3) ? HG_PLANT_NONE : HG_PLANT_STARTING, r.finding.plant);
+    }
+}
+
 static void radii_that_were_too_small_begin_the_filter_anew(void **state)
 {
     (void)state;
@@ -210,6 +223,7 @@ int main(void)
         cmocka_unit_test(a_generator_that_is_refused_stops_the_start),
         cmocka_unit_test(an_alarm_of_the_filter_alone_is_statistical),
         cmocka_unit_test(a_filter_alone_is_statistical_always),
+        cmocka_unit_test(all_must_have_settled),
         cmocka_unit_test(radii_that_were_too_small_begin_the_filter_anew),
         cmocka_unit_test(a_refused_number_counts_and_begins_the_filter_anew),
     };

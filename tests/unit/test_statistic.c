@@ -149,6 +149,29 @@ static void an_input_that_is_not_known_begins_anew(void **state)
     assert_near(0.4, r.self.filter.x[0], 1e-5);
 }
 
+static void every_input_must_be_known(void **state)
+{
+    (void)state;
+    static rig r;
+    static const uint8_t input[] = {0U, 2U};
+    static const hg_real two[] = {R(0), R(2)};
+    static const hg_real known[] = {R(0.5), R(0.5)};
+    hg_statistic_config c = sf_config;
+    c.inputs = 2U;
+    c.input = input;
+    c.zero = two;
+    c.drive = two;
+    c.direct = two;
+    c.known = known;
+    begin(&r);
+    r.self.config = &c;
+    for (size_t i = 0U; i < 4U; i++) {
+        r.radius[0] = ((i & 1U) != 0U) ? R(1) : R(0);
+        assert_status(HG_OK, step(&r, 0.0, 2.0, 0.0, ((i & 2U) != 0U) ? 1.0 : 0.0));
+        assert_count((i == 0U) ? 1 : 0, r.self.samples);
+    }
+}
+
 static void a_number_out_of_range_begins_anew(void **state)
 {
     (void)state;
@@ -171,6 +194,7 @@ int main(void)
         cmocka_unit_test(a_known_input_moves_the_plant_and_the_filter_alike),
         cmocka_unit_test(a_radius_is_in_the_filters_unit),
         cmocka_unit_test(an_input_that_is_not_known_begins_anew),
+        cmocka_unit_test(every_input_must_be_known),
         cmocka_unit_test(a_number_out_of_range_begins_anew),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

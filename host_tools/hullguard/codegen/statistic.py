@@ -5,11 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from hullguard.design.statistic import FILTER_NUMBERS, MapTable, StatisticTable
+from hullguard.design.statistic import FILTER_NUMBERS, MapTable
 from hullguard.design.tables import Tables
 
 Emit = Callable[[str, str, str, Sequence[Sequence[str]], str], list[str]]  # table() of codegen/c.py
 NONE = "HG_POLYNOMIAL_NONE"
+GROUPS = (
+    ("start", "product", "parent", "factor"),
+    ("noise", "moment", "mean", "covariance"),
+    ("cut_moment", "cut_state", "cut_scale"),
+    ("box", "x0", "P0", "M0"),
+    ("Q", "R", "range", "fresh"),
+)  # of hg_polynomial_config, a line each
 ABOUT = {
     "start": "where the products of each monomial begin",
     "product": "index of monomial i times monomial j at start[i] + j",
@@ -36,8 +43,6 @@ ABOUT = {
     "direct": "measurements from inputs, filter units a signal unit",
     "known": "radius up to which an input is known, signal units",
 }
-BOUNDED = ("cut_moment", "cut_state", "cut_scale")  # empty without a bound
-INPUTS = ("input", "zero", "drive", "direct", "known")
 
 
 def _square(values: Sequence[str]) -> list[Sequence[str]]:
@@ -97,7 +102,7 @@ def statistic_configs(tables: Tables, real: Callable[[float], str]) -> list[str]
             f"                {_map_config('f', t.f, n)},",
             f"                {_map_config('h', t.h, n)},",
         ]
-        for group in (("start", "product", "parent", "factor"), ("noise", "moment", "mean", "covariance"), ("cut_moment", "cut_state", "cut_scale"), ("box", "x0", "P0", "M0"), ("Q", "R", "range", "fresh")):
+        for group in GROUPS:
             lines.append("                " + ", ".join(f".{name} = {tied[name]}" for name in group) + ",")
         numbers = [f".{name} = {real(getattr(t, name))}" for name in FILTER_NUMBERS]
         lines += [f"                {', '.join(numbers[:2])},", f"                {', '.join(numbers[2:])}}},"]

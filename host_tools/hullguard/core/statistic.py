@@ -76,7 +76,8 @@ def follow(library: Library, table: StatisticTable, value: Array, radius: Array)
         rows["J"].append(ffi.unpack(J, len(STATISTICS)))
         rows["ready"].append(float(lib.hg_statistic_ready(self)))
     del kept
-    return FilterRun(*(np.array(rows[name], dtype=float) for name in rows), restarts=int(self.filter.restarts))
+    x, variance, shown, level, ready = (np.array(row, dtype=float) for row in rows.values())
+    return FilterRun(x, variance, shown, level, ready, int(self.filter.restarts))
 
 
 def emulated_plant(library: Library, plant: Nonlinear) -> tuple[Any, list[Any]]:

@@ -124,7 +124,7 @@ class Scaled:
 
 
 def scaled_plant(plant: Nonlinear, outputs: Sequence[int]) -> Scaled:
-    """x = point + unit xi, y' = gain y."""
+    """With x = point + unit xi and y' = gain y."""
     unit = [power(UNIT * d) for d in plant.deviation]
     gain = [1.0 / power(UNIT * math.sqrt(plant.v[j].moment(2))) for j in outputs]
     n, origin = len(unit), (0,) * len(unit)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import itertools
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +20,13 @@ FUNCTIONS = ("sin", "cos", "tan", "atan", "exp", "log", "sqrt", "tanh")  # opera
 FIRST = 8
 DEPTH_MAX = 64  # HGH_STACK
 CELLS = 256  # of a box, about
+_OF_TWO: dict[int, Callable[[Any, Any], Any]] = {
+    ADD: operator.add,
+    SUBTRACT: operator.sub,
+    MULTIPLY: operator.mul,
+    DIVIDE: operator.truediv,
+    POWER: operator.pow,
+}
 _BINARY: dict[type[ast.operator], int] = {ast.Add: ADD, ast.Sub: SUBTRACT, ast.Mult: MULTIPLY, ast.Div: DIVIDE, ast.Pow: POWER}
 
 
@@ -104,7 +112,7 @@ def evaluated(program: Program, variables: Sequence[Any], functions: Callable[[s
             stack.append(functions(FUNCTIONS[op - FIRST], stack.pop()))
         else:
             right, left = stack.pop(), stack.pop()
-            stack.append({ADD: lambda a, b: a + b, SUBTRACT: lambda a, b: a - b, MULTIPLY: lambda a, b: a * b, DIVIDE: lambda a, b: a / b, POWER: lambda a, b: a**b}[op](left, right))
+            stack.append(_OF_TWO[op](left, right))
     return stack[0]
 
 
@@ -122,7 +130,9 @@ class Expansion:
     remainder: float  # largest error of the terms on the box
 
 
-def expanded(program: Program, point: Sequence[float], inputs: Sequence[float], orders: Sequence[tuple[int, ...]], box: Sequence[float], where: str, names: Sequence[str]) -> Expansion:
+def expanded(
+    program: Program, point: Sequence[float], inputs: Sequence[float], orders: Sequence[tuple[int, ...]], box: Sequence[float], where: str, names: Sequence[str]
+) -> Expansion:
     """Taylor polynomial with the exponents `orders` (all up to a degree), about a state and an input; inputs must enter linearly and alone."""
     import sympy
 

@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hullguard.design.polynomial import DEGREE_MAX, Noise, atoms, exponential, laplace, monomials, normal, samples, student, two_point, uniform
+from hullguard.design.polynomial import DEGREE_MAX, Noise, exponential, laplace, monomials, normal, samples, student, two_point, uniform
 from hullguard.errors import InputError
-from hullguard.model.expression import FUNCTIONS, Expansion, Program, compiled, expanded, of_terms, value_of
+from hullguard.model.expression import FUNCTIONS, Expansion, Program, compiled, expanded, of_terms
 from hullguard.model.table import Array, Table
 
 if TYPE_CHECKING:
@@ -91,9 +91,12 @@ def read_nonlinear(table: Table, outputs: Sequence[str], inputs: Sequence[str], 
     shown = table.table("h")
     h = tuple(_row(shown.raw(o), f"{shown.where}.{o}", names, parameters, n) for o in outputs)
     shown.close()
-    orders = [o for o in monomials(n, degree)]
-    where = [f"{table.where}.f[{i}]" for i in range(n)], [f"{shown.where}.{o}" for o in outputs]
-    of_f, of_h = (tuple(expanded(r, point.tolist(), given.tolist(), orders, box.tolist(), at, inputs) for r, at in zip(rows, places, strict=True)) for rows, places in ((f, where[0]), (h, where[1])))
+
+    def near(row: Program, where: str) -> Expansion:
+        return expanded(row, point.tolist(), given.tolist(), monomials(n, degree), box.tolist(), where, inputs)
+
+    of_f = tuple(near(row, f"{table.where}.f[{i}]") for i, row in enumerate(f))
+    of_h = tuple(near(row, f"{shown.where}.{o}") for row, o in zip(h, outputs, strict=True))
     noise = table.table("noise")
     w, v = (tuple(_noise(noise, name, path) for name in some) for some in (states, outputs))
     noise.close()
@@ -105,9 +108,8 @@ def read_nonlinear(table: Table, outputs: Sequence[str], inputs: Sequence[str], 
     for name, drawn in zip(outputs, v, strict=True):
         if drawn.moment(2) <= 0.0:
             raise InputError(f"{table.where}.noise.{name}: a sensor without noise; give it a deviation above 0")
-    made = Nonlinear(
-        f, h, w, v, *(tuple(map(float, a)) for a in (point, given, box, mean, deviation)), degree, of_f, of_h
-    )
+    centre, given_input, half, start_mean, spread = (tuple(map(float, a)) for a in (point, given, box, mean, deviation))
+    made = Nonlinear(f, h, w, v, centre, given_input, half, start_mean, spread, degree, of_f, of_h)
     A, C = _slopes(of_f, n), _slopes(of_h, n)
     B, D = (np.array([e.input for e in rows], dtype=float).reshape(len(rows), p) for rows in (of_f, of_h))
     return Plant(
@@ -227,11 +229,3 @@ def read_filters(detector: Table, outputs: Sequence[str], faults: Sequence[Fault
     if not made:
         raise detector.error("polynomial", "no filter; give at least one")
     return tuple(made)
-
-
-def settled_values(plant: Nonlinear) -> list[float]:
-    """h at the operating point: what the sensors show there."""
-    return [value_of(row, [*plant.point, *plant.input]) for row in plant.h]
-
-
-__all__ = ["KIND", "FilterSpec", "Nonlinear", "atoms", "read_filters", "read_nonlinear", "settled_values"]

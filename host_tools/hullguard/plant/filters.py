@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hullguard.core.library import Library
 from hullguard.core.native import Plant
@@ -88,7 +89,7 @@ def _facts(f: Filtered, faults: Sequence[FaultSpec]) -> dict[str, Any]:
     return row
 
 
-def _first(above: Array) -> int | None:
+def _first(above: NDArray[np.bool_]) -> int | None:
     at = np.flatnonzero(above)
     return int(at[0]) if len(at) else None
 

@@ -23,27 +23,31 @@ def section(design: Design) -> Iterator[str]:
     model = design.model
     yield "<h2>Polynomial filters</h2>"
     yield f"<p>{esc(INTRO)}</p>"
-    rows = [
-        ["state", name, len(e.terms), num(b), num(e.remainder), _noise(w)]
-        for name, e, b, w in zip(model.plant.states, plant.of_f, plant.box, plant.w, strict=True)
-    ]
+    rows = [["state", name, len(e.terms), num(b), num(e.remainder), _noise(w)] for name, e, b, w in zip(model.plant.states, plant.of_f, plant.box, plant.w, strict=True)]
     rows += [["output", model.signals[i].name, len(e.terms), "", num(e.remainder), _noise(v)] for i, e, v in zip(model.outputs, plant.of_h, plant.v, strict=True)]
     yield table(
         ["", "name", "#terms", "#box ±", "#remainder", "noise"],
         rows,
-        f"Taylor polynomials of degree {plant.degree} about the operating point. Remainder: largest error on the box, bounded by intervals; 0 where the polynomial is the function.",
+        f"Taylor polynomials of degree {plant.degree} about the operating point. "
+        "Remainder: largest error on the box, bounded by intervals; 0 where the polynomial is the function.",
     )
+    names = design.judges[-len(design.tables.polynomials) :]
+    rows = []
+    for name, p in zip(names, design.tables.polynomials, strict=True):
+        plain, joint = min(1.0, 1.0 / p.kappa**2), min(1.0, p.judged / p.joint)
+        rows.append([name, p.lifted, 4 * p.reals, num(p.kappa), num(plain), num(math.sqrt(p.joint)), num(joint), num(math.sqrt(p.drift)), f"{p.settle}"])
     yield table(
         ["filter", "#lifted states", "#RAM (bytes)", "#kappa", "#P of plain", "#level of J2", "#P of J2", "#level of drift", "#settles (samples)"],
-        [
-            [name, p.lifted, 4 * p.reals, num(p.kappa), num(min(1.0, 1.0 / p.kappa**2)), num(math.sqrt(p.joint)), num(min(1.0, p.judged / p.joint)), num(math.sqrt(p.drift)), p.settle]
-            for name, p in zip(design.judges[-len(design.tables.polynomials) :], design.tables.polynomials, strict=True)
-        ],
+        rows,
         "RAM in single precision. P: bound of the false alarms a sample by Chebyshev, whatever the noise.",
     )
     yield table(
         ["#filter", "#degree", "#RAM (bytes)", "#bounded (bytes)"],
-        [[i + 1, d, *(_bytes(model.plant.n, len(spec.outputs), d, bounded) for bounded in (False, True))] for i, spec in enumerate(model.polynomials) for d in range(1, DEGREE_MAX + 1)],
+        [
+            [f"{i + 1}", f"{d}", *(_bytes(model.plant.n, len(spec.outputs), d, bounded) for bounded in (False, True))]
+            for i, spec in enumerate(model.polynomials)
+            for d in range(1, DEGREE_MAX + 1)
+        ],
         "What each degree takes, in single precision.",
     )
 

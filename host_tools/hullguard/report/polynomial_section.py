@@ -75,9 +75,8 @@ def section(run: Run, every: Sequence[Filter]) -> Iterator[str]:
     if all(t is not None for f in first for _, _, t in f.states.values()):
         caption = f"Estimate less truth as large as it was before a fault, and ± {BAND:g} standard deviations as the filter claims them, degree by degree."
         yield picture(error_figure(run, first), "filters-errors", "Errors of the estimates", caption)
-    yield picture(
-        ratio_figure(run, first), "filters-statistics", "Statistics relative to their levels", "r/J of each statistic and degree; above 1 it is an alarm of that filter. Square roots of J2² and of the drift."
-    )
+    caption = "r/J of each statistic and degree; above 1 it is an alarm of that filter. Square roots of J2² and of the drift."
+    yield picture(ratio_figure(run, first), "filters-statistics", "Statistics relative to their levels", caption)
 
 
 def _comparison(every: Sequence[Filter]) -> str:
@@ -90,7 +89,8 @@ def _comparison(every: Sequence[Filter]) -> str:
         row: list[Any] = [f.number, f"{f.degree}{' (used)' if f.own else ''}", facts["ram_bytes"], *[num(facts["error_rms"][s]) for s in states]]
         row += [num(facts["consistency"][s]) for s in states] + [f"{facts['false_alarms'][s]} of {facts['healthy_samples']}" for s in STATISTICS]
         rows.append(row + ["never" if facts["delay"][s] is None else facts["delay"][s] for s in STATISTICS if facts["delay"]])
-    return table(head, rows, "Errors and false alarms are counted in the healthy samples in which the filter had settled; delays in samples from the first fault to the first alarm of that statistic.")
+    about = "Errors and false alarms are counted in the healthy samples in which the filter had settled; delays in samples from the first fault to that statistic's first alarm."
+    return table(head, rows, about)
 
 
 def _sheet(run: Run, rows: int) -> tuple[draw.Sheet, list[Axes]]:
@@ -109,7 +109,7 @@ def error_figure(run: Run, every: Sequence[Filter]) -> Figure:
     names = list(every[0].states)[:PANELS]
     sheet, axes = _sheet(run, len(names) * len(every))
     for i, name in enumerate(names):
-        errors = [f.states[name][0] - (f.states[name][2] if f.states[name][2] is not None else 0.0) for f in every]
+        errors = [value - truth for value, _, truth in (f.states[name] for f in every) if truth is not None]
         healthy = slice(len(run.k) // 20, min((f.start for f in run.faults), default=len(run.k)))
         settled = max((float(np.abs(e[healthy]).max(initial=0.0)) for e in errors), default=0.0) * 1.15  # what a fault does may leave the panel
         widest = max(float(np.median(f.states[name][1])) for f in every) * BAND * 1.3
