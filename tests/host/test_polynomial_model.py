@@ -92,7 +92,7 @@ def test_inputs_are_gains_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize(
-    "noise", [noises.laplace(0.2), noises.student(0.2, 9.0), noises.exponential(-0.2), noises.two_point(0.2, 0.3), noises.samples([0.1, 0.5, -0.4, 0.3])], ids=lambda n: str(n.kind)
+    "noise", [noises.laplace(0.2), noises.student(0.2, 9.0), noises.contaminated(0.2, 0.1, 3.0), noises.exponential(-0.2), noises.two_point(0.2, 0.3), noises.samples([0.1, 0.5, -0.4, 0.3])], ids=lambda n: str(n.kind)
 )
 def test_draws_have_the_moments(noise: noises.Noise) -> None:
     lib, ffi, native, count = library("f64").lib, library("f64").ffi, Arrays(library("f64")), 40_000

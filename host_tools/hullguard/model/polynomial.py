@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hullguard.design.polynomial import DEGREE_MAX, Noise, exponential, laplace, monomials, normal, samples, student, two_point, uniform
+from hullguard.design.polynomial import DEGREE_MAX, Noise, contaminated, exponential, laplace, monomials, normal, samples, student, two_point, uniform
 from hullguard.errors import InputError
 from hullguard.model.expression import FUNCTIONS, Expansion, Program, compiled, expanded, of_terms
 from hullguard.model.table import Array, Table
@@ -168,7 +168,7 @@ def _row(given: object, where: str, variables: Sequence[str], parameters: dict[s
 
 def _noise(table: Table, name: str, path: Path) -> Noise:
     t = table.table(name)
-    kind = t.text("kind", choices=[*NOISES, "exponential", "student", "two-point", "samples"])
+    kind = t.text("kind", choices=[*NOISES, "exponential", "student", "contaminated", "two-point", "samples"])
     if kind == "samples":
         made = _sampled(t, path)
     elif kind == "two-point":
@@ -177,6 +177,8 @@ def _noise(table: Table, name: str, path: Path) -> Noise:
         made = exponential(t.number("deviation", 0.0) * (-1.0 if t.text("tail", "right", ["left", "right"]) == "left" else 1.0))
     elif kind == "student":
         made = student(t.number("deviation", 1e-30), t.number("degrees_of_freedom", 2.001, 1e6))
+    elif kind == "contaminated":
+        made = contaminated(t.number("deviation", 1e-30), t.number("share", 1e-6, 1.0 - 1e-6), t.number("ratio", 1e-3, 1e3))
     else:
         made = NOISES[kind](t.number("deviation", 0.0) * (math.sqrt(3.0) if kind == "uniform" else 1.0))
     t.close()
