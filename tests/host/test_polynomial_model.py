@@ -182,7 +182,7 @@ def test_powers_gain_on_skewed_noise_and_claim_what_they_have(models: Models) ->
 
 def test_a_limit_of_memory_says_what_would_fit(models: Models) -> None:
     with pytest.raises(InputError, match=r"cubic_suspension.toml: detector.polynomial: degree 3 with 2 states and 1 outputs takes \d+ bytes; what fits: degree 2"):
-        Models().design({"detector.polynomial.0.degree": 3}, "default", "cubic_suspension")
+        Models().design({"detector.polynomial.0.degree": 3, "detector.polynomial.0.ram_limit_bytes": 2100}, "default", "cubic_suspension")
     d = models.design(scenario="default", name="cubic_suspension")
     spec, known = d.model.polynomials[0], known_of(d.tables.groups, d.usual.tolist())
     size = 4 * d.tables.polynomials[0].reals
