@@ -507,7 +507,7 @@ static hg_status step_banks(hg_detector *self, hg_evidence *evidence)
     return status;
 }
 
-/* And of the polynomial filters. What one has taken in with a radius that was too small cannot be taken back: it begins again. */
+/* And of the polynomial filters. What one has taken in with a radius that was too small it forgets by itself; beginning again would leave it blind for longer. */
 static hg_status step_polynomials(hg_detector *self, hg_evidence *evidence)
 {
     const hg_detector_config *config = self->config;
@@ -517,9 +517,6 @@ static hg_status step_polynomials(hg_detector *self, hg_evidence *evidence)
         const uint8_t judge = (uint8_t)(sets + p);
         const uint16_t place = (uint16_t)(first_of_banks(config) + config->banks + (HG_STATISTICS * (uint32_t)p));
         hg_statistic *polynomial = &self->memory.polynomial[p];
-        if ((evidence->rewound & config->decision.feeds[judge]) != 0U) {
-            hg_statistic_reset(polynomial);
-        }
         const hg_status moved = hg_statistic_step(polynomial, self->value, self->radius, &self->r[place], &self->J[place]);
         const bool ready = hg_statistic_ready(polynomial);
         if (moved != HG_OK) {

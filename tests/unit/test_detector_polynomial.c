@@ -184,19 +184,21 @@ static void all_must_have_settled(void **state)
     }
 }
 
-static void radii_that_were_too_small_begin_the_filter_anew(void **state)
+static void an_alarm_of_radii_that_were_too_small_is_taken_back(void **state)
 {
     (void)state;
     const hg_detector_config c = alone_config();
     begin(&c);
     rest(10);
-    for (int k = 0; k < 3; k++) { /* silence, first what the trigger does not look at, then what it promises */
+    for (int k = 0; k < 2; k++) { /* silence, first what the trigger does not look at, then what it promises */
         assert_status(HG_OK, sample(AT, 0, AT, false, true));
     }
-    assert_count(13, r.polynomial[0].samples);
-    assert_status(HG_OK, sample(AT, 0, AT, true, false)); /* was a loss */
-    assert_count(1, r.polynomial[0].samples);
-    assert_int_equal(HG_PLANT_STARTING, r.finding.plant);
+    assert_int_equal(HG_PLANT_NONE, r.finding.plant);
+    assert_status(HG_OK, sample(AT, 0, 6 * AT, false, true)); /* the input shows in y at once: the sender should have spoken */
+    assert_int_equal(HG_PLANT_PROVISIONAL, r.finding.plant);
+    assert_status(HG_OK, sample(AT, 240, 6 * AT, true, false)); /* it had, and the frame was lost */
+    assert_int_equal(HG_PLANT_NONE, r.finding.plant);
+    assert_count(14, r.polynomial[0].samples);
 }
 
 static void a_refused_number_counts_and_begins_the_filter_anew(void **state)
@@ -224,7 +226,7 @@ int main(void)
         cmocka_unit_test(an_alarm_of_the_filter_alone_is_statistical),
         cmocka_unit_test(a_filter_alone_is_statistical_always),
         cmocka_unit_test(all_must_have_settled),
-        cmocka_unit_test(radii_that_were_too_small_begin_the_filter_anew),
+        cmocka_unit_test(an_alarm_of_radii_that_were_too_small_is_taken_back),
         cmocka_unit_test(a_refused_number_counts_and_begins_the_filter_anew),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,7 +6,8 @@
  *
  *  Inputs that the detector knows move the plant by x+ = f(x) + B u + w, y = h(x) + D u + v: D u is taken off the measurement, and B u moves the point of
  *  expansion; no moment of the error feels either. An input that is not known (its closing frame was lost) leaves a sample that nothing stands for: the
- *  filter begins again. So it does where radii that it has used turn out to have been too small, for what it took in cannot be taken back.
+ *  filter begins again. Where radii that it has used turn out to have been too small it goes on: the decision takes back what alarm they made, and the
+ *  estimate forgets them.
  *  Its alarms hold with a probability (HG_BASIS_STATISTICAL). Float only: HG_WITH_POLYNOMIAL is 0 in fixed point. Not reentrant per instance; safe in
  *  interrupt context; no allocation. */
 #ifndef HULLGUARD_STATISTIC_H
