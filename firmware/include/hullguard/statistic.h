@@ -20,6 +20,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define HG_STATISTICS 3U /* plain, joint, drift */
 
 typedef struct {                 /* flash: generated */
@@ -71,5 +75,9 @@ hg_status hg_statistic_step(hg_statistic *self, const hg_real *value, const hg_r
 
 /** Do its alarms count: have `settle` samples passed since it began? */
 bool hg_statistic_ready(const hg_statistic *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
