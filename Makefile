@@ -39,7 +39,7 @@ UNIT_BUILDS     := q31 bare
 UNIT_TESTS_q31  := test_q31
 UNIT_TESTS_bare := test_bare
 UNIT_ONCE       := test_e2e_errors
-REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH)
+REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH POLYNOMIAL)
 
 LIB_SRC     := $(wildcard firmware/src/*.c)
 MODEL_SRC   := $(wildcard firmware/models/*.c)

@@ -1,15 +1,22 @@
 #include "models.h"
 
+#include "battery_cell.h"
+#include "cubic_suspension.h"
 #include "openacc.h"
 #include "platoon.h"
 #include "platoon_bank.h"
+#include "quadratic_sensor.h"
 #include "suspension.h"
 #include "suspension_published.h"
+#include "two_state.h"
 
 #include <string.h>
 
 /* One line a model: its name as its generated header writes it, in lower and in upper case. */
-#define MODELS(X) X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC) X(suspension, SUSPENSION) X(suspension_published, SUSPENSION_PUBLISHED)
+#define MODELS(X)                                                                                                          \
+    X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC) X(suspension, SUSPENSION)                        \
+    X(suspension_published, SUSPENSION_PUBLISHED) X(cubic_suspension, CUBIC_SUSPENSION)                                    \
+    X(quadratic_sensor, QUADRATIC_SENSOR) X(two_state, TWO_STATE) X(battery_cell, BATTERY_CELL)
 
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_node name##_node;                                        \

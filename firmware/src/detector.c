@@ -35,11 +35,15 @@ static bool with_mismatch(const hg_detector_config *config)
 /* A macro, so that it is a constant for a compiler that does not optimise too: without the part there is nothing to link with. */
 #define BY_ZONOTOPE(config) ((HG_WITH_ZONOTOPE != 0) && ((config)->zonotope != NULL))
 
+/* As above: fixed point has nothing to link with. */
+#define POLYNOMIALS(config) ((HG_WITH_POLYNOMIAL != 0) ? (config)->polynomials : 0U)
+
 /* Has this image all that a configuration asks for? */
 static bool parts_there(const hg_detector_config *config)
 {
     return (predictors_of(config) == config->predictors) && (banks_of(config) == config->banks) &&
-           (with_mismatch(config) == (config->mismatch != NULL)) && (BY_ZONOTOPE(config) == (config->zonotope != NULL));
+           (with_mismatch(config) == (config->mismatch != NULL)) && (BY_ZONOTOPE(config) == (config->zonotope != NULL)) &&
+           (POLYNOMIALS(config) == config->polynomials);
 }
 
 uint32_t hg_detector_reals(const hg_detector_config *config)
@@ -59,6 +63,9 @@ uint32_t hg_detector_reals(const hg_detector_config *config)
     for (uint8_t i = 0U; i < predictors_of(config); i++) {
         reals += HG_PREDICT_REALS(config->predict[i].order, config->predict[i].inputs, config->predict[i].width);
     }
+    for (uint8_t p = 0U; (HG_WITH_POLYNOMIAL != 0) && (p < config->polynomials); p++) {
+        reals += hg_statistic_reals(&config->polynomial[p]);
+    }
     return reals;
 }
 
@@ -73,7 +80,7 @@ uint32_t hg_detector_sums(const hg_detector_config *config)
 
 static bool counts_valid(const hg_detector_config *config)
 {
-    const uint16_t judged = (uint16_t)config->generators + config->banks;
+    const uint32_t judged = (uint32_t)config->generators + config->banks + config->polynomials;
     bool valid = (config->signals >= 1U) && (config->width >= config->signals) && (config->history >= 1U) && (config->groups >= 1U) &&
                  (config->groups <= HG_GROUPS_MAX) && (config->predictors <= HG_GROUPS_MAX) && (config->hold != NULL);
     valid = valid && (judged >= 1U) && (judged <= HG_GENERATORS_MAX) && (judged == config->decision.generators);
@@ -81,6 +88,7 @@ static bool counts_valid(const hg_detector_config *config)
     valid = valid && HG_SIZE_FITS(HG_ONLY_GROUPS, config->groups) && HG_SIZE_FITS(HG_ONLY_GENERATORS, config->generators) &&
             HG_SIZE_FITS(HG_ONLY_WIDTH, config->width) && HG_SIZE_FITS(HG_ONLY_HISTORY, config->history);
     valid = valid && ((config->banks == 0U) || ((config->bank != NULL) && (config->window >= 1U)));
+    valid = valid && ((config->polynomials == 0U) || (config->polynomial != NULL));
     return valid && ((config->predictors == 0U) || (config->predict != NULL));
 }
 
@@ -90,6 +98,7 @@ static bool memory_there(const hg_detector_config *config, const hg_detector_mem
     there = there && ((config->generators == 0U) || ((memory->residual != NULL) &&
                       (((config->hull != NULL) ? (const void *)memory->hull : (const void *)memory->zonotope) != NULL)));
     there = there && ((config->banks == 0U) || ((memory->bank != NULL) && (memory->sum != NULL)));
+    there = there && ((config->polynomials == 0U) || (memory->polynomial != NULL));
     return there && ((config->predictors == 0U) || (memory->predict != NULL));
 }
 
@@ -157,7 +166,7 @@ static bool generator_valid(const hg_detector_config *config, uint8_t g)
 
 static bool generators_valid(const hg_detector_config *config)
 {
-    uint32_t residuals = config->banks;
+    uint32_t residuals = config->banks + (HG_STATISTICS * (uint32_t)POLYNOMIALS(config));
     bool valid = true;
     for (uint8_t g = 0U; valid && (g < config->generators); g++) {
         valid = generator_valid(config, g);
@@ -165,6 +174,9 @@ static bool generators_valid(const hg_detector_config *config)
     }
     for (uint8_t b = 0U; valid && (b < banks_of(config)); b++) {
         valid = (config->bank[b].window <= config->history) && hg_bank_valid(&config->bank[b], config->signals, config->width, config->window);
+    }
+    for (uint8_t p = 0U; (HG_WITH_POLYNOMIAL != 0) && valid && (p < config->polynomials); p++) {
+        valid = hg_statistic_valid(&config->polynomial[p], config->signals);
     }
     return valid && (residuals == config->residuals);
 }
@@ -211,6 +223,10 @@ static hg_status start_generators(hg_detector *self, hg_start how)
         const hg_predict_config *predict = &config->predict[i];
         status = hg_predict_start(&self->memory.predict[i], predict, memory);
         memory = &memory[HG_PREDICT_REALS(predict->order, predict->inputs, predict->width)];
+    }
+    for (uint8_t p = 0U; (HG_WITH_POLYNOMIAL != 0) && (status == HG_OK) && (p < config->polynomials); p++) {
+        status = hg_statistic_start(&self->memory.polynomial[p], &config->polynomial[p], memory);
+        memory = &memory[hg_statistic_reals(&config->polynomial[p])];
     }
     if ((status == HG_OK) && (banks_of(config) > 0U)) {
         hg_acc *sum = self->memory.sum;
@@ -290,6 +306,9 @@ void hg_detector_restart(hg_detector *self, hg_start how)
         reset_threshold(self, g, how);
     }
     reset_banks(self);
+    for (uint8_t p = 0U; (HG_WITH_POLYNOMIAL != 0) && (p < self->config->polynomials); p++) {
+        hg_statistic_reset(&self->memory.polynomial[p]);
+    }
     hg_decision_reset(&self->decision);
 }
 
@@ -476,6 +495,12 @@ static hg_status step_generators(hg_detector *self, hg_evidence *evidence)
     return status;
 }
 
+/* Behind the generators' residuals. */
+static uint16_t first_of_banks(const hg_detector_config *config)
+{
+    return (uint16_t)((config->residuals - config->banks) - (HG_STATISTICS * (uint32_t)POLYNOMIALS(config)));
+}
+
 /* The same of the banks. A sample that cannot be kept is missing from every window. */
 static hg_status step_banks(hg_detector *self, hg_evidence *evidence)
 {
@@ -483,7 +508,7 @@ static hg_status step_banks(hg_detector *self, hg_evidence *evidence)
     const hg_status kept = (banks_of(config) > 0U) ? hg_ring_push(&self->values, self->value) : HG_OK;
     hg_status status = HG_OK;
     for (uint8_t b = 0U; b < banks_of(config); b++) {
-        const uint16_t place = (uint16_t)((config->residuals - config->banks) + b);
+        const uint16_t place = (uint16_t)(first_of_banks(config) + b);
         hg_bank *bank = &self->memory.bank[b];
         hg_status judged = kept;
         if (kept == HG_OK) {
@@ -506,13 +531,51 @@ static hg_status step_banks(hg_detector *self, hg_evidence *evidence)
     return status;
 }
 
+/* And of the polynomial filters. What one has taken in with a radius that was too small it forgets by itself; beginning again would leave it blind for longer. */
+static hg_status step_polynomials(hg_detector *self, hg_evidence *evidence)
+{
+    const hg_detector_config *config = self->config;
+    const uint8_t sets = (uint8_t)(config->generators + config->banks);
+    hg_status status = HG_OK;
+    for (uint8_t p = 0U; (HG_WITH_POLYNOMIAL != 0) && (p < config->polynomials); p++) {
+        const uint8_t judge = (uint8_t)(sets + p);
+        const uint16_t place = (uint16_t)(first_of_banks(config) + config->banks + (HG_STATISTICS * (uint32_t)p));
+        hg_statistic *polynomial = &self->memory.polynomial[p];
+        const hg_status moved = hg_statistic_step(polynomial, self->value, self->radius, &self->r[place], &self->J[place]);
+        const bool ready = hg_statistic_ready(polynomial);
+        if (moved != HG_OK) {
+            refuse(self);
+            status = moved;
+        } else if (ready && hg_decision_exceeds(&self->r[place], &self->J[place], HG_STATISTICS)) {
+            evidence->alarm |= (uint32_t)1U << judge;
+        } else {
+            /* within its thresholds, or not settled */
+        }
+        evidence->ready = evidence->ready && ready;
+    }
+    return status;
+}
+
+/* What a verdict rests on: bounds where they say as much by themselves. */
+static hg_basis basis_of(const hg_detector *self, hg_plant plant)
+{
+    const uint8_t sets = (uint8_t)(self->config->generators + self->config->banks);
+    bool bounded = (sets > 0U) && (plant <= HG_PLANT_NONE);
+    for (uint8_t g = 0U; g < sets; g++) {
+        bounded = bounded || (self->memory.alarm[g].state == plant);
+    }
+    return bounded ? HG_BASIS_SET : HG_BASIS_STATISTICAL;
+}
+
 hg_status hg_detector_step(hg_detector *self, hg_finding *finding)
 {
     hg_evidence evidence = {.alarm = 0U, .ready = true, .doubt = 0U, .rewound = 0U};
     step_holds(self, &evidence);
     const hg_status generators = step_generators(self, &evidence);
     const hg_status banks = step_banks(self, &evidence);
+    const hg_status polynomials = step_polynomials(self, &evidence);
     finding->plant = hg_decision_step(&self->decision, &evidence, &finding->candidates);
-    finding->basis = HG_BASIS_SET;
-    return (generators == HG_OK) ? banks : generators;
+    finding->basis = basis_of(self, finding->plant);
+    const hg_status sets = (generators == HG_OK) ? banks : generators;
+    return (sets == HG_OK) ? polynomials : sets;
 }

@@ -38,6 +38,7 @@ from hullguard.model import FaultSpec, Model, load_model, parse_fault, parse_ove
 from hullguard.model.schema import FAULTS_MAX, Scenario
 from hullguard.plant.detect import Detector, from_bus, from_log
 from hullguard.plant.estimates import estimate_facts, estimated, write_estimates
+from hullguard.plant.filters import Followed, filter_facts, filter_words, filtered, write_filters
 from hullguard.plant.recording import read_recording
 from hullguard.plant.run import ALARMS, Bus, InProcess, OnCan, Pace, Run, Source, Trace, candidate_names, spoken, summary, write_files
 from hullguard.plant.unknown import Continuous
@@ -190,6 +191,9 @@ def run_design(args: argparse.Namespace) -> int:
     for i, g in enumerate(made.generators):
         found = ", ".join(f"{made.model.faults[f].name} {v:.3g}" for f, v in zip(g.spec.faults, g.smallest, strict=True))
         say(args, f"  generator {i + 1}: order {g.spec.order}, {g.observer.W.shape[0]} residuals, smallest fault: {found or 'none asked for'}")
+    for p, name in zip(made.tables.polynomials, made.judges[len(made.judges) - len(made.tables.polynomials) :], strict=True):
+        levels = f"kappa {p.kappa:.3g}, J2 {p.joint**0.5:.3g}, drift {p.drift**0.5:.3g}"
+        say(args, f"  {name}: {p.lifted} lifted states, {4 * p.reals} bytes of RAM in float32; levels: {levels}")
     for i, u in enumerate(made.uios):
         radii = ", ".join(f"{name} {r:.3g}" for name, r in zip(u.names, u.tables.steady, strict=True))
         say(args, f"  unknown-input observer {i + 1}: radii {radii}")
@@ -229,6 +233,8 @@ def emulated(native: Native, made: Design, scenario: Scenario, faults: Sequence[
     """The emulated plant of a scenario."""
     if made.model.uios:
         return Continuous(made, native, scenario, faults, samples, seed)
+    if made.model.polynomials:
+        return Followed(native, made, scenario.reference, faults, seed)
     return Plant(native, made, scenario.reference, faults, seed)
 
 
@@ -285,10 +291,14 @@ def _drive(
     result = summary(made, native, trace, faults, facts)
     found = estimated(made, native.library, trace, start, source.emulated if isinstance(source, Continuous) else None)
     result |= estimate_facts(found) if found else {}
+    filters = filtered(made, native.library, trace, source.states if isinstance(source, Followed) else None)
+    result |= filter_facts(filters, faults) if filters else {}
     if out is not None:
         write_files(out, made, native, trace, faults, result)
         if found:
             write_estimates(out, made, found)
+        if filters:
+            write_filters(out, made, filters)
         from hullguard.codegen.dbc import emit_dbc
 
         (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
@@ -439,6 +449,8 @@ def _tell(args: argparse.Namespace, result: dict[str, Any]) -> None:
             say(args, f"{began}, found at sample {f['detected_at']} ({f['delay']} samples, {f['delay'] * period:g} s), {sure}; may be: {', '.join(f['candidates'])}" + _narrowed(f))
     for v in result.get("isolation", []):
         say(args, _isolated(v))
+    for row in result.get("filters", []):
+        say(args, filter_words(row))
     alarms = result["false_alarms"]
     say(args, f"false alarms before the fault: {alarms['provisional']} provisional, {alarms['confirmed']} confirmed; largest |r|/J {result['margin_max']:.3f}")
 
@@ -599,6 +611,8 @@ def _campaign_cases(args: argparse.Namespace, keep: Path | None) -> list[Case]:
             raise InputError(f"--plants: model {made.model.name} has no interval to draw from; give a parameter as {{ value = 1.0, pm = 0.1 }}")
         if attack and min((f.start for f in faults), default=1) < 1:
             raise InputError("--attack aims at samples before the first fault: let it start at sample 1 or later")
+        if attack:
+            _need_bounds(made.model, "--attack")
         base = Case(setup_of(made, args.real), samples, scenario.reference, (), args.seed, attack=attack, plants=args.plants, varied=tuple(varied.items()))
         cases += [replace(base, faults=f, loss=p, burst=b) for f in grid.fault_sets(faults, args.each_fault, sizes) for p in losses for b in bursts]
     return cases
@@ -676,6 +690,12 @@ def _campaign_expected(args: argparse.Namespace, result: dict[str, Any]) -> int:
     return 0
 
 
+def _need_bounds(model: Model, what: str) -> None:
+    """Refuse what reasons with the bounds of a linear plant."""
+    if model.polynomials:
+        raise InputError(f"{what}: model {model.name} has noise with a distribution and no bounds to choose within; choose a linear model")
+
+
 def run_limit(args: argparse.Namespace) -> int:
     """`hullguard limit`."""
     from hullguard.campaign.limit_study import RUNS_TASK, LimitJob, limit_study
@@ -690,6 +710,7 @@ def run_limit(args: argparse.Namespace) -> int:
     faults, sizes = list(dict.fromkeys(args.fault or known)), _sizes(args.size)
     if not faults:
         raise InputError(f"model {model.name} has no faults to look for: add [[faults]]")
+    _need_bounds(model, "limit")
     job = LimitJob(made.model, made.stored, args.real, args.window, args.samples or scenario.samples, scenario.reference, args.seed)
     with progress(args, "limit") as tick:
         done, total = [0], len(faults) * len(sizes) * -(-args.runs // RUNS_TASK)

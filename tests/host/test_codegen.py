@@ -27,6 +27,7 @@ from hullguard.core.native import Native
 from hullguard.design.design import Design, design
 from hullguard.design.fixed import lower
 from hullguard.design.protection import MODES, PROFILES
+from hullguard.design.statistic import FILTER_COUNTS, FILTER_NUMBERS, FILTER_WIDE, StatisticTable
 from hullguard.design.tables import (
     EXTENDED,
     FD,
@@ -338,6 +339,69 @@ static void generator(const hg_residual_config *g, const hg_hull_config *h, cons
     }
 }
 
+static void map(const hg_polynomial_map *m, unsigned rows)
+{
+    const unsigned terms = m->end[rows - 1U];
+    u("map_width", m->width);
+    for (unsigned i = 0U; i < rows; i++) { u("end", m->end[i]); }
+    rs("coefficient", m->coefficient, terms);
+    us("factor", m->factor, terms * m->width);
+}
+
+static void filter(const hg_statistic_config *c)
+{
+    const hg_polynomial_config *f = &c->filter;
+    const unsigned rows = (unsigned)f->lifted + f->measured;
+    const unsigned wide = (unsigned)f->lifted + 1U;
+    u("states", f->states);
+    u("outputs", f->outputs);
+    u("degree", f->degree);
+    u("bounded", f->bounded);
+    u("lifted", f->lifted);
+    u("measured", f->measured);
+    u("judged", f->judged);
+    u("noises", f->noises);
+    u("ring", f->ring);
+    u("lower", f->lower);
+    map(&f->f, f->states);
+    map(&f->h, f->outputs);
+    for (unsigned i = 0U; i <= f->ring; i++) { u("start", f->start[i]); }
+    for (unsigned i = 0U; i < f->start[f->ring]; i++) { u("product", f->product[i]); }
+    us("parent", f->parent, rows);
+    us("factor", f->factor, rows);
+    us("noise", f->noise, f->lower);
+    us("moment", f->moment, f->lower);
+    rs("mean", f->mean, f->noises);
+    rs("covariance", f->covariance, (unsigned)f->noises * f->noises);
+    if (f->bounded) {
+        us("cut_moment", f->cut_moment, (unsigned)f->ring - f->lower);
+        us("cut_state", f->cut_state, (unsigned)f->ring - f->lower);
+        rs("cut_scale", f->cut_scale, (unsigned)f->ring - f->lower);
+    }
+    rs("box", f->box, f->states);
+    rs("x0", f->x0, f->states);
+    rs("P0", f->P0, (unsigned)f->states * f->states);
+    rs("M0", f->M0, wide * wide);
+    rs("Q", f->Q, f->states);
+    rs("R", f->R, f->outputs);
+    rs("range", f->range, f->outputs);
+    rs("fresh", f->fresh, f->outputs);
+    r("reach", f->reach);
+    r("kappa", f->kappa);
+    r("joint", f->joint);
+    r("weight", f->weight);
+    r("drift", f->drift);
+    us("signal", c->signal, f->outputs);
+    rs("gain", c->gain, f->outputs);
+    u("inputs", c->inputs);
+    us("input", c->input, c->inputs);
+    rs("zero", c->zero, c->inputs);
+    rs("drive", c->drive, (unsigned)f->states * c->inputs);
+    rs("direct", c->direct, (unsigned)f->outputs * c->inputs);
+    rs("known", c->known, c->inputs);
+    u("settle", c->settle);
+}
+
 void dump(FILE *into, const hg_node_config *config, const hg_sender_config *sender)
 {
     const hg_detector_config *d = config->detector;
@@ -347,7 +411,7 @@ void dump(FILE *into, const hg_node_config *config, const hg_sender_config *send
     u("groups", d->groups);
     for (unsigned i = 0U; i < d->groups; i++) { group(&d->hold[i], &config->message[i], &sender[i]); }
     u("generators", d->generators);
-    u("either", (d->hull == NULL) != (d->zonotope == NULL));
+    u("either", (d->generators == 0U) || ((d->hull == NULL) != (d->zonotope == NULL)));
     for (unsigned i = 0U; i < d->generators; i++) {
         generator(&d->residual[i], (d->hull != NULL) ? &d->hull[i] : NULL, (d->zonotope != NULL) ? &d->zonotope[i] : NULL);
     }
@@ -357,6 +421,8 @@ void dump(FILE *into, const hg_node_config *config, const hg_sender_config *send
     if (d->mismatch != NULL) { uncertain(d->mismatch); }
     u("banks", d->banks);
     for (unsigned i = 0U; i < d->banks; i++) { certificates(&d->bank[i]); }
+    u("polynomials", d->polynomials);
+    for (unsigned i = 0U; i < d->polynomials; i++) { filter(&d->polynomial[i]); }
     u("decisions", d->decision.generators);
     us("feeds", d->decision.feeds, d->decision.generators);
     for (unsigned i = 0U; i < d->decision.generators; i++) { u("faults", d->decision.faults[i]); }
@@ -504,13 +570,14 @@ def designs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Design]:
     made["uncertain"] = design(load_model("platoon", UNCERTAIN))[0]
     made["drag"] = design(load_model("platoon_bank", DRAG))[0]
     made["suspension"] = design(load_model("suspension"))[0]
+    made["cubic"] = design(load_model("cubic_suspension", {"detector.polynomial": [{"degree": 2}, {"degree": 1, "bounded": True}]}))[0]
     made["everything"] = design(load_model("platoon_bank", EVERYTHING))[0]
     made["network"] = design(load_model(str(ROOT / "tests" / "fixtures" / "network" / "network.toml")))[0]
     made["published"] = design(load_model("platoon", {"detector.threshold": "zonotope_published"}))[0]
     return made
 
 
-NAMES = ("platoon", "tank", "places", "bank", "drag", "uncertain", "everything", "published", "network", "suspension")
+NAMES = ("platoon", "tank", "places", "bank", "drag", "uncertain", "everything", "published", "network", "suspension", "cubic")
 FIXED = ("platoon", "places", "bank", "drag")  # those that fixed point can hold
 NUMBERS = [(name, real) for name in NAMES for real in REALS if real != "q31" or name in FIXED]
 FIELDS = {"crc": "E2E_CRC", "counter": "E2E_counter", "nibble": "E2E_data_id", "stamp": "E2E_stamp"}
@@ -807,6 +874,15 @@ def _bank(b: BankTable) -> Numbers:
     return numbers + _each("extras", len(b.extra)) + _some(b, "extra") + _each("extra_weight", b.extra_weight if b.extra else ())
 
 
+def _filter(p: StatisticTable) -> Numbers:
+    numbers = _some(p, *FILTER_COUNTS[:3]) + _each("bounded", int(p.bounded)) + _some(p, *FILTER_COUNTS[3:])
+    for m in (p.f, p.h):
+        numbers += _each("map_width", m.width) + _some(m, "end", "coefficient", "factor")
+    numbers += _some(p, *FILTER_WIDE, "parent", "factor", "noise", "moment", "mean", "covariance", "cut_moment", "cut_state", "cut_scale")
+    numbers += _some(p, "box", "x0", "P0", "M0", "Q", "R", "range", "fresh", *FILTER_NUMBERS, "signal", "gain")
+    return numbers + _each("inputs", len(p.input)) + _some(p, "input", "zero", "drive", "direct", "known", "settle")
+
+
 def _uncertain(m: MismatchTable | None) -> Numbers:
     if m is None:
         return _each("uncertain", 0)
@@ -834,6 +910,7 @@ def expected_numbers(t: Tables) -> Numbers:
     numbers += _each("generators", len(t.generators)) + _each("either", 1) + [p for g in t.generators for p in _generator(g)]
     numbers += _each("predictors", len(t.predictors)) + [p for x in t.predictors for p in _predictor(x)] + _uncertain(t.mismatch)
     numbers += _each("banks", len(t.banks)) + [p for b in t.banks for p in _bank(b)]
+    numbers += _each("polynomials", len(t.polynomials)) + [p for f in t.polynomials for p in _filter(f)]
     numbers += _each("decisions", t.judged) + _each("feeds", tuple(g.feeds for g in t.judging)) + _each("faults", tuple(g.faults for g in t.judging))
     numbers += (
         _each("up", t.up) + _each("down", t.down) + _each("latch", int(t.latch)) + _each("history", t.history) + _each("values", t.window) + _each("all_residuals", t.residuals)

@@ -51,8 +51,10 @@ SUSPENSION = Case("suspension", "default", "f32")  # its readings come from a ro
 EVERY = [("platoon", "default"), ("platoon", "rest"), ("platoon", "manoeuvres"), ("platoon", "adaptive"), ("openacc", "default")]
 SINGLE = [Case(m, s, "f32") for m, s in EVERY]
 DOUBLE = [Case(m, s, "f64") for m, s in EVERY]
-ON_VCAN = [*SINGLE, Case("platoon", "default", "f64"), Case("openacc", "default", "f64"), SUSPENSION]
-HERE_AND_NOW = [*SINGLE, *DOUBLE, SUSPENSION]
+BOUNDED = [*SINGLE, Case("platoon", "default", "f64"), Case("openacc", "default", "f64"), SUSPENSION]
+STATISTICAL = [Case("cubic_suspension", "default", "f32")]  # its alarms hold with a probability
+ON_VCAN = [*BOUNDED, *STATISTICAL]
+HERE_AND_NOW = [*SINGLE, *DOUBLE, SUSPENSION, *STATISTICAL]
 BUS_STATES = ("absent", "good", "lossy", "stale")
 PLANTS = {"starting": 0, "none": 1, "provisional": 2, "confirmed": 3}
 
@@ -142,7 +144,7 @@ def test_another_seed_is_another_run(case: Case, in_process: dict[Case, Ended]) 
     assert len(set(log[min(log)])) > 1, "readings move"
 
 
-@pytest.mark.parametrize("case", ON_VCAN, ids=lambda c: c.name)
+@pytest.mark.parametrize("case", BOUNDED, ids=lambda c: c.name)
 def test_no_false_alarm(case: Case, on_vcan: dict[Case, Ended]) -> None:
     result = on_vcan[case].result
     assert result["false_alarms"] == {"provisional": 0, "confirmed": 0}

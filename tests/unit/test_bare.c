@@ -1,5 +1,5 @@
 /** @file
- *  A library without zonotopes, banks, prediction and uncertain plants (config.h): it refuses the models that need one, and runs the others.
+ *  A library without zonotopes, banks, prediction, uncertain plants and polynomial filters (config.h): it refuses the models that need one, and runs the others.
  *  Built for this alone. */
 #include "support.h"
 
@@ -8,7 +8,7 @@
 #include "openacc.h"
 #include "platoon.h"
 
-#if HG_WITH_ZONOTOPE || HG_WITH_BANK || HG_WITH_PREDICT || HG_WITH_MISMATCH
+#if HG_WITH_ZONOTOPE || HG_WITH_BANK || HG_WITH_PREDICT || HG_WITH_MISMATCH || HG_WITH_POLYNOMIAL
 #error "this test is for a library without the optional parts"
 #endif
 
@@ -72,6 +72,12 @@ static void each_part_is_refused_alone(void **state)
     c = sm_detector;
     c.predictors = 1U;
     c.predict = &predict;
+    assert_status(HG_E_CONFIG, start_of(&c));
+    const hg_statistic_config polynomial = {.settle = 1U};
+    c = sm_detector;
+    c.polynomials = 1U;
+    c.polynomial = &polynomial;
+    c.decision.generators = SM_GENERATORS + 1U;
     assert_status(HG_E_CONFIG, start_of(&c));
 }
 

@@ -39,8 +39,14 @@
 #ifndef HG_WITH_MODES
 #define HG_WITH_MODES 1 /* of a hull (hull.h) */
 #endif
+#ifndef HG_WITH_POLYNOMIAL
+#define HG_WITH_POLYNOMIAL (1 - HG_REAL_Q31) /* its moments have no range that could be proven in fixed point */
+#endif
 #if HG_REAL_Q31 && HG_WITH_ZONOTOPE
 #error "the zonotope is for the float types: a model for HG_REAL_Q31 has its threshold by the hull"
+#endif
+#if HG_REAL_Q31 && HG_WITH_POLYNOMIAL
+#error "the polynomial filter is for the float types"
 #endif
 
 /* Senders of one model, the closing one included. The verdict frame has two bits of bus health for each: at most 8. */

@@ -1,9 +1,9 @@
 /** @file
- *  A detector: holds of all groups, residual generators and banks of certificates side by side, each with its threshold, under one decision. It
- *  knows codes and samples, nothing of frames or clocks. One sample is
+ *  A detector: holds of all groups, residual generators, banks of certificates and polynomial filters side by side, each with its threshold, under one
+ *  decision. It knows codes and samples, nothing of frames or clocks. One sample is
  *
  *      hg_detector_receive()  for each good frame of the open sample      hg_detector_lose()  for each one known to be lost
- *      hg_detector_step()     closes it: hold, derived signals, generators, banks, thresholds, decision
+ *      hg_detector_step()     closes it: hold, derived signals, generators, banks, filters, thresholds, decision
  *
  *  The signal vector: what the groups send, group after group; then what is derived from it: the predicted groups' signals (predict.h), then
  *  the uncertain states (mismatch.h). Generators, thresholds and banks name their signals by place and do not care which is which.
@@ -19,6 +19,7 @@
 #include "hullguard/predict.h"
 #include "hullguard/residual.h"
 #include "hullguard/ring.h"
+#include "hullguard/statistic.h"
 #include "hullguard/status.h"
 #include "hullguard/zonotope.h"
 
@@ -38,12 +39,14 @@ typedef struct {                /* flash: one a model, generated */
     const hg_residual_config *residual;   /* [generators] */
     const hg_hull_config     *hull;       /* [generators] thresholds by the exact hull, or null: then by */
     const hg_zonotope_config *zonotope;   /* [generators] zonotopes */
-    uint8_t                   banks;      /* generators + banks: 1 .. HG_GENERATORS_MAX */
+    uint8_t                   banks;      /* generators + banks + polynomials: 1 .. HG_GENERATORS_MAX */
     const hg_bank_config     *bank;       /* [banks] */
-    hg_decision_config        decision;   /* of generators and banks, generators first */
+    uint8_t                   polynomials; /* polynomial filters */
+    const hg_statistic_config *polynomial; /* [polynomials], not read without one */
+    hg_decision_config        decision;   /* of generators, then banks, then polynomial filters */
     uint8_t                   history;    /* rows of the ring of radii, 1 .. 255: more than the taps of any hull, with zonotopes than any interval_max, as many as any bank's window */
     uint8_t                   window;     /* rows of the ring of values: the longest window of a bank; 0 without one */
-    uint16_t                  residuals;  /* of all generators together, and one for each bank */
+    uint16_t                  residuals;  /* of all generators together, one for each bank, HG_STATISTICS for each polynomial filter */
     uint16_t                  codes;      /* numbers of integer memory: HG_HOLD_CODES(signals) */
     uint32_t                  reals;      /* numbers of real memory: hg_detector_reals() */
     uint32_t                  sums;       /* numbers of the banks' memory: hg_detector_sums() */
@@ -56,7 +59,8 @@ typedef struct {                /* where a detector keeps what it knows; owned b
     hg_hull  *hull;             /* [generators], null without one */
     hg_zonotope *zonotope;      /* [generators], null without one */
     hg_bank  *bank;             /* [banks], null without one */
-    hg_alarm *alarm;            /* [generators + banks] */
+    hg_statistic *polynomial;   /* [polynomials], null without one */
+    hg_alarm *alarm;            /* [generators + banks + polynomials] */
     int32_t  *code;             /* [codes] */
     uint16_t  codes;            /* length of code[] */
     hg_real  *real;             /* [reals] */
@@ -73,21 +77,21 @@ typedef struct {                /* RAM: one a detector */
     hg_decision               decision;
     hg_real                  *value;     /* [width] of the last sample */
     hg_real                  *radius;    /* [width] of the last sample: the newest row of radii */
-    hg_real                  *r;         /* [residuals] of the last sample, generators one after another, then the closest of each bank */
+    hg_real                  *r;         /* [residuals] of the last sample, generators one after another, then the closest of each bank, then the filters' statistics */
     hg_real                  *J;         /* [residuals] of the last sample */
     hg_real                  *past;      /* [width] scratch */
-    uint32_t                  refusals;  /* generator and bank steps refused for a number that is not finite; saturates */
+    uint32_t                  refusals;  /* steps of generators, banks and filters refused for a number that is not finite; saturates */
     uint8_t                   samples;   /* closed since it began, saturated: no radius before is corrected */
     uint32_t                  beginnings; /* the start and restarts since, wraps: what keeps a state beside it (uio.h) begins again with it */
 } hg_detector;
 
 typedef struct {                /* what a step found */
     hg_plant plant;
-    hg_basis basis;
+    hg_basis basis;             /* SET where what rests on bounds says it too */
     uint32_t candidates;        /* bit i: fault i of the model can explain the alarm; 0 without one, or when no single fault can */
 } hg_finding;
 
-/** Numbers of real memory that a configuration needs. Cost: a pass over generators and predictors. */
+/** Numbers of real memory that a configuration needs. Cost: a pass over generators, predictors and filters. */
 uint32_t hg_detector_reals(const hg_detector_config *config);
 
 /** Numbers of the banks' memory that a configuration needs. Cost: a pass over the banks. */
@@ -119,7 +123,7 @@ hg_status hg_detector_lose(hg_detector *self, uint8_t group);
 
 /** Close the sample and judge it.
  *  @retval HG_OK         *finding is this sample's
- *  @retval HG_E_NUMERIC  a generator or a bank refused a number that is not finite; a generator begins again, and *finding is the others'
+ *  @retval HG_E_NUMERIC  a generator, a bank or a filter refused a number that is not finite; a generator or filter begins again, and *finding is the others'
  *  Cost: the sum of its parts; independent of the data but for a rewind. */
 hg_status hg_detector_step(hg_detector *self, hg_finding *finding);
 

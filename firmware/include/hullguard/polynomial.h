@@ -46,8 +46,6 @@
 extern "C" {
 #endif
 
-#if HG_REAL_F32 || HG_REAL_F64
-
 /** Smallest pivot of a covariance divided by its diagonal. */
 #if HG_REAL_F64
 #define HG_POLYNOMIAL_PIVOT HG_REAL_C(1e-10)
@@ -200,7 +198,6 @@ void hg_polynomial_reset(hg_polynomial *self);
  *  most start[ring] of every row and of every factor of f and h; for J and M+ about 2 (N + measured) N^2. */
 hg_status hg_polynomial_step(hg_polynomial *self, const hg_real *y, const hg_real *radius);
 
-#endif
 #ifdef __cplusplus
 }
 #endif

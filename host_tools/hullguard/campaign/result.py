@@ -21,6 +21,7 @@ def campaign_result(parts: Sequence[tuple[Case, Rows]], scenario: str | None, li
     first = parts[0][0]
     head: dict[str, Any] = {"model": first.setup.model.name, "real": first.setup.real, "scenario": first.setup.model.scenario(scenario).name, "confidence": CONFIDENCE}
     head["thresholds"] = sorted({case.setup.model.detector.threshold for case, _ in parts})
+    head["basis"] = "statistical" if first.setup.model.polynomials else "set"
     shared = {k: v for k, v in first.labels().items() if all(case.labels()[k] == v for case, _ in parts)}
     told = names([case for case, _ in parts])
     cases = [{"case": i, "name": told[i], **case.labels(), **summary([(case, rows)])} for i, (case, rows) in enumerate(parts)]

@@ -15,6 +15,7 @@ import numpy as np
 
 from hullguard.codegen.both import Both, Scaled, both
 from hullguard.codegen.names import Names, names_of, unit_of
+from hullguard.codegen.statistic import statistic_configs, statistic_tables
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
 from hullguard.design.protection import ProtectionTable
@@ -169,7 +170,10 @@ def parts(design: Design) -> tuple[tuple[str, bool], ...]:
     """Options of config.h that leave a part out, and whether this model needs it."""
     tables = design.tables
     modal = bool(design.uios) or any(isinstance(g, ModalGeneratorTable) for g in tables.generators)
-    used = (("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch), ("MODES", modal))
+    used = (
+        *(("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch)),
+        *(("MODES", modal), ("POLYNOMIAL", tables.polynomials)),
+    )
     return tuple((f"HG_WITH_{part}", bool(there)) for part, there in used)
 
 
@@ -223,7 +227,7 @@ def _storage(tables: Tables) -> list[str]:
     codes, closing = max(tables.codes, 1), max(len(tables.groups[tables.closing].signals), 1)
     threshold = "zonotope" if zonotopes(tables) else "hull"
     own = [("hg_predict", "predict", len(tables.predictors)), ("hg_residual", "residual", len(tables.generators)), (f"hg_{threshold}", threshold, len(tables.generators))]
-    own += [("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums)]
+    own += [("hg_bank", "bank", len(tables.banks)), ("hg_acc", "sum", tables.sums), ("hg_statistic", "polynomial", len(tables.polynomials))]
     return [
         "/* Memory of one detector node. */",
         "typedef struct {",
@@ -672,6 +676,7 @@ def _node(design: Design) -> list[str]:
         f"    .predictors = {len(tables.predictors)}U, .predict = {predict}, .mismatch = {mismatch},",
         f"    .generators = {count}U, .residual = {own}, .hull = {thresholds[0]}, .zonotope = {thresholds[1]},",
         f"    .banks = {len(tables.banks)}U, .bank = {bank},",
+        *([f"    .polynomials = {len(tables.polynomials)}U, .polynomial = polynomial,"] if tables.polynomials else []),
         f"    .decision = {{.generators = {tables.judged}U, .feeds = feeds, .faults = moved_by,",
         f"                 .up = {tables.up}U, .down = {tables.down}U, .latch = {boolean(tables.latch)}}},",
         f"    .history = {tables.history}U, .window = {tables.window}U, .residuals = {tables.residuals}U,",
@@ -705,6 +710,7 @@ def _starts(tables: Tables) -> list[str]:
     balls = zonotopes(tables)
     parts = (("predict", tables.predictors), ("residual", generators), ("hull", [] if balls else generators), ("zonotope", balls), ("bank", banks), ("sum", banks))
     own = [f"self->{name}" if there else "NULL" for name, there in parts]
+    filters = " .polynomial = self->polynomial," if tables.polynomials else ""
     return [
         f"hg_status {t}_node_start({t}_node *self, hg_start how)",
         "{",
@@ -712,7 +718,7 @@ def _starts(tables: Tables) -> list[str]:
         "        return HG_E_ARGUMENT;",
         "    }",
         "    const hg_node_memory memory = {",
-        *entries(f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},", 21),
+        *entries(f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},{filters}", 21),
         f"                     .alarm = self->alarm, .code = self->code, .codes = {tables.codes}U, .real = self->real, .reals = {tables.reals}UL,",
         f"                     .sum = {own[5]}, .sums = {tables.sums}UL}},",
         "        .link = self->link,",
@@ -749,7 +755,8 @@ def _source(design: Design, names: Names) -> str:
         lines += _generator(generator, f"generator{i + 1}", [*names.signals, *derived_names(tables, names)])
     derived = [*names.signals, *derived_names(tables, names)]
     lines += [*_predictors(tables, names.signals), *_mismatch(tables.mismatch, names.signals), *_banks(tables, derived)]
-    lines += ["/* ---- All generators and banks ---- */", "", *_generators(tables), *_judged(tables), "/* ---- Node ---- */", "", *_node(design)]
+    lines += statistic_tables(tables, derived, table, reals)
+    lines += ["/* ---- All generators and banks ---- */", "", *_generators(tables), *statistic_configs(tables, real), *_judged(tables), "/* ---- Node ---- */", "", *_node(design)]
     lines += _starts(tables)
     return "\n".join(lines) + "\n"
 

@@ -10,7 +10,6 @@
 
 #if !HG_REAL_Q31
 #include "fusion_run.h"
-#include "polynomial_run.h"
 #endif
 
 #define HGH_STATES_MAX 64
@@ -29,6 +28,11 @@ typedef struct {
 void   hgh_random_start(hgh_random *self, uint64_t seed, uint64_t run, uint64_t purpose);
 double hgh_random_unit(hgh_random *self);   /* uniform in [0, 1) */
 double hgh_random_signed(hgh_random *self); /* uniform in [-1, 1) */
+
+#if !HG_REAL_Q31
+#include "polynomial_run.h"
+#endif
+#include "nonlinear.h"
 
 enum { HGH_BIAS = 1, HGH_DRIFT = 2, HGH_GAIN = 3, HGH_FREEZE = 4, HGH_NOISE = 5 };
 
@@ -82,6 +86,7 @@ typedef struct {                        /* x+ = A x + B u + Ed d, y = C x + D u 
     const hg_code_scale *scale;         /* [p] the wire of each input */
     const int32_t       *unit;          /* [p] of the library's numbers: 2^unit in fixed point, else 0 */
     double               sample_time_s;
+    const hgh_nonlinear *nonlinear;     /* instead of A .. Fd, or null */
 } hgh_plant_config;
 
 typedef struct {

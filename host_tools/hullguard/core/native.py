@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hullguard.core import statistic
 from hullguard.core.library import Library
 from hullguard.core.protect import protection
 from hullguard.core.zonotope import fill
@@ -143,6 +144,9 @@ class Native:
             d.hull = hulls
         self._derived(d)
         self._banks(d)
+        d.polynomials, d.polynomial = len(t.polynomials), self._new("hg_statistic_config[]", len(t.polynomials) or 1)
+        for i, p in enumerate(t.polynomials):
+            self._keep += statistic.fill(self.library, d.polynomial[i], p)
         d.decision.generators, d.decision.up, d.decision.down, d.decision.latch = t.judged, t.up, t.down, t.latch
         d.decision.feeds = self._ints("uint8_t", [g.feeds for g in t.judging])
         d.decision.faults = self._ints("uint32_t", [g.faults for g in t.judging])
@@ -253,7 +257,7 @@ class Node:
         own = memory.detector
         own.hold, own.predict, own.alarm = room("hg_hold", groups), room("hg_predict", len(t.predictors)), room("hg_alarm", t.judged)
         own.residual, own.hull, own.bank = room("hg_residual", len(t.generators)), room("hg_hull", len(t.generators)), room("hg_bank", len(t.banks))
-        own.zonotope = room("hg_zonotope", len(t.generators))
+        own.zonotope, own.polynomial = room("hg_zonotope", len(t.generators)), room("hg_statistic", len(t.polynomials))
         own.code, own.codes, own.real, own.reals = room("int32_t", t.codes), d.codes, room("hg_real", d.reals), d.reals
         own.sum, own.sums = room("hg_acc", d.sums), d.sums
         memory.link, memory.closing = room("hg_link", groups), room("int32_t", len(t.groups[t.closing].signals) + 1)
@@ -423,6 +427,9 @@ class PlantConfig:
         self._keep.append(scale)
         c.scale, c.sample_time_s = scale, model.sample_time_s
         c.unit = ints([native.tables.units[i] if native.tables.units else 0 for i in model.inputs])
+        if plant.nonlinear is not None:
+            c.nonlinear, kept = statistic.emulated_plant(native.library, plant.nonlinear)
+            self._keep += kept
         self.config = c
 
 

@@ -116,6 +116,11 @@ void hgh_plant_start(hgh_plant *self, const hgh_plant_config *config, hgh_refere
     for (int32_t i = 0; i < config->n; i++) {
         self->x[i] = config->equilibrium[i] + config->initial_range[i] * hgh_random_signed(&initial);
     }
+#if !HG_REAL_Q31
+    if (config->nonlinear != NULL) {
+        hgh_nonlinear_start(config->nonlinear, config->n, &initial, self->x);
+    }
+#endif
     if (reference.kind == HGH_MIXED) {
         self->reference.kind = HGH_STEPS + (int32_t)(3.0 * hgh_random_unit(&self->drive));
         self->reference.period = 2 + (int32_t)((double)reference.period * (0.25 + 1.5 * hgh_random_unit(&self->drive)));
@@ -171,6 +176,18 @@ static double command(hgh_plant *self, int32_t i)
     return (c->as_sent[i] != 0) ? hgh_number(hg_code_value(&c->scale[i], hg_code_encode(&c->scale[i], hgh_real(u, c->unit[i]))), c->unit[i]) : u;
 }
 
+/* Output i before a sensor's fault. */
+static double shown(hgh_plant *self, int32_t i)
+{
+    const hgh_plant_config *c = self->config;
+#if !HG_REAL_Q31
+    if (c->nonlinear != NULL) {
+        return hgh_nonlinear_output(c->nonlinear, c->n, i, self->x, self->u, &self->disturbance);
+    }
+#endif
+    return row(c->C, i, c->n, self->x) + row(c->D, i, c->p, self->u) + row(c->Fd, i, c->nd, self->d);
+}
+
 void hgh_plant_read(hgh_plant *self, const double *d, double *value)
 {
     const hgh_plant_config *c = self->config;
@@ -183,9 +200,20 @@ void hgh_plant_read(hgh_plant *self, const double *d, double *value)
         self->u[i] = hgh_faults_apply(&self->faults, 1, c->input[i], self->k, u);
     }
     for (int32_t i = 0; i < c->m; i++) {
-        const double y = row(c->C, i, c->n, self->x) + row(c->D, i, c->p, self->u) + row(c->Fd, i, c->nd, self->d);
-        value[c->output[i]] = hgh_faults_apply(&self->faults, 0, c->output[i], self->k, y);
+        value[c->output[i]] = hgh_faults_apply(&self->faults, 0, c->output[i], self->k, shown(self, i));
     }
+}
+
+/* State i of the next sample. */
+static double moved(hgh_plant *self, int32_t i)
+{
+    const hgh_plant_config *c = self->config;
+#if !HG_REAL_Q31
+    if (c->nonlinear != NULL) {
+        return hgh_nonlinear_state(c->nonlinear, c->n, i, self->x, self->u, &self->disturbance);
+    }
+#endif
+    return row(c->A, i, c->n, self->x) + row(c->B, i, c->p, self->u) + row(c->Ed, i, c->nd, self->d);
 }
 
 void hgh_plant_move(hgh_plant *self)
@@ -193,7 +221,7 @@ void hgh_plant_move(hgh_plant *self)
     const hgh_plant_config *c = self->config;
     double next[HGH_STATES_MAX];
     for (int32_t i = 0; i < c->n; i++) {
-        next[i] = row(c->A, i, c->n, self->x) + row(c->B, i, c->p, self->u) + row(c->Ed, i, c->nd, self->d);
+        next[i] = moved(self, i);
     }
     memcpy(self->x, next, (size_t)c->n * sizeof next[0]);
     self->k++;

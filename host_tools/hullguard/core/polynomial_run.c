@@ -25,8 +25,8 @@ static double normal_of(double scale, double u, double v)
     return scale * sqrt(-2.0 * log(u)) * cos(TWO_PI * v);
 }
 
-/* Two numbers of the stream for each draw, whatever the kind. Student's t by Bailey's polar form. */
-static double noise_of(const hgh_polynomial_noise *noise, hgh_random *random)
+/* Student's t by Bailey's polar form. */
+double hgh_noise_draw(const hgh_polynomial_noise *noise, hgh_random *random)
 {
     const double u = 1.0 - hgh_random_unit(random);
     const double v = hgh_random_unit(random);
@@ -71,7 +71,7 @@ static void measure(runner *r, int64_t k)
 {
     const hgh_polynomial_config *c = r->config;
     for (int32_t j = 0; j < c->config->outputs; j++) {
-        double y = row_of(&c->config->h, c->h, j, r->x) + noise_of(&c->v[j], &r->sensor);
+        double y = row_of(&c->config->h, c->h, j, r->x) + hgh_noise_draw(&c->v[j], &r->sensor);
         if ((c->fault == HGH_PLANT_SENSOR) && (k >= c->fault_at)) {
             y += c->size[j];
         }
@@ -89,7 +89,7 @@ static void move_plant(runner *r, int64_t k)
     const int32_t n = c->config->states;
     double next[UINT8_MAX];
     for (int32_t l = 0; l < n; l++) {
-        next[l] = row_of(&c->config->f, c->f, l, r->x) + noise_of(&c->w[l], &r->plant);
+        next[l] = row_of(&c->config->f, c->f, l, r->x) + hgh_noise_draw(&c->w[l], &r->plant);
         if ((c->fault == HGH_PLANT_ACTUATOR) && (k >= c->fault_at)) {
             next[l] += c->size[l];
         }
@@ -126,7 +126,7 @@ static void one_run(runner *r, uint64_t run)
     hgh_random_start(&r->sensor, c->seed, run, 302U);
     for (int32_t l = 0; l < c->config->states; l++) {
         const hgh_polynomial_noise prior = {.kind = HGH_NOISE_NORMAL, .scale = c->p0[l]};
-        r->x[l] = c->x0[l] + noise_of(&prior, &r->initial);
+        r->x[l] = c->x0[l] + hgh_noise_draw(&prior, &r->initial);
     }
     for (int32_t s = 0; s < HGH_POLYNOMIAL_STATISTICS; s++) {
         r->result->first[r->run * HGH_POLYNOMIAL_STATISTICS + s] = -1;

@@ -27,6 +27,9 @@ typedef struct {
     const double *below;  /* [atoms] probability of this atom and those before it */
 } hgh_polynomial_noise;
 
+/** One draw; takes two numbers of the stream, whatever the kind. */
+double hgh_noise_draw(const hgh_polynomial_noise *noise, hgh_random *random);
+
 typedef struct {
     const hg_polynomial_config *config;
     const double               *f;        /* coefficients of config->f and */

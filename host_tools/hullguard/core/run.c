@@ -50,7 +50,8 @@ static hg_node_memory node_memory(arena *a, const hg_node_config *node)
     m.detector.hull = take(a, d->generators, sizeof(hg_hull));
     m.detector.zonotope = take(a, d->generators, sizeof(hg_zonotope));
     m.detector.bank = take(a, d->banks, sizeof(hg_bank));
-    m.detector.alarm = take(a, (size_t)d->generators + d->banks, sizeof(hg_alarm));
+    m.detector.polynomial = take(a, d->polynomials, sizeof(hg_statistic));
+    m.detector.alarm = take(a, (size_t)d->generators + d->banks + d->polynomials, sizeof(hg_alarm));
     m.detector.codes = (uint16_t)HG_HOLD_CODES(d->signals);
     m.detector.code = take(a, m.detector.codes, sizeof(int32_t));
     m.detector.reals = hg_detector_reals(d);
@@ -80,6 +81,9 @@ static int64_t settling(const hg_detector_config *d)
     }
     for (uint8_t b = 0U; b < d->banks; b++) {
         longest = (d->bank[b].window > longest) ? d->bank[b].window : longest;
+    }
+    for (uint8_t p = 0U; p < d->polynomials; p++) {
+        longest = (d->polynomial[p].settle > longest) ? d->polynomial[p].settle : longest;
     }
     return longest;
 }

@@ -42,7 +42,7 @@ class BankFacts:
 def bank_facts(design: Design) -> list[BankFacts]:
     """Every bank of a design, in the order of the decision."""
     model, made = design.model, []
-    names = design.judges[len(design.generators) :]
+    names = design.judges[len(design.generators) : len(design.generators) + len(design.tables.banks)]
     for name, stored, table in zip(names, used_banks(model, design.stored), design.tables.banks, strict=True):
         faults = tuple(i for i in range(len(model.faults)) if stored.faults >> i & 1)
         form = window_form(model.plant, table.window)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
+from hullguard.design.statistic import FILTER_PLACES, FILTER_ROWS, FILTER_WIDE, JUDGE_ROWS, StatisticTable
 from hullguard.design.tables import GeneratorTable, PredictTable, Tables
 from hullguard.design.zonotope_table import ZonotopeTable
 
@@ -36,7 +37,8 @@ def costs(design: Design) -> list[Cost]:
     """Every judge in the order of the decision, then what they share. The numbers of RAM add up to hg_detector_reals() and hg_detector_sums()."""
     t = design.tables
     made = [_generator(name, g) for name, g in zip(design.judges, t.generators, strict=False)]
-    made += [bank_cost(name, b) for name, b in zip(design.judges[len(made) :], t.banks, strict=True)]
+    made += [bank_cost(name, b) for name, b in zip(design.judges[len(made) :], t.banks, strict=False)]
+    made += [_filter(name, p) for name, p in zip(design.judges[len(made) :], t.polynomials, strict=True)]
     made += [_predictor(f"prediction of {t.groups[p.group].name}", p) for p in t.predictors]
     if t.mismatch is not None:
         states, width = len(t.mismatch.constant), len(t.mismatch.signal)
@@ -74,6 +76,14 @@ def bank_cost(name: str, b: BankTable) -> Cost:
     """Of one bank."""
     lags = b.certificates * b.window
     return Cost(name, lags * (2 * len(b.signal) + len(b.extra)), lags * (len(b.signal) + len(b.extra)) + b.certificates + 1, 2 * b.certificates)
+
+
+def _filter(name: str, p: StatisticTable) -> Cost:
+    """A polynomial filter: half of its work is the noise's part of the covariance. Places of one byte and of two count as the numbers that would fill them."""
+    rows = p.lifted + p.measured
+    tables = sum(len(getattr(p, field)) for field in (*FILTER_ROWS, *JUDGE_ROWS)) + len(p.f.coefficient) + len(p.h.coefficient)
+    places = 2 * sum(len(getattr(p, field)) for field in FILTER_WIDE) + sum(len(getattr(p, field)) for field in FILTER_PLACES) + len(p.f.factor) + len(p.h.factor)
+    return Cost(name, 2 * rows * p.lower * (p.lower + rows), tables + -(-places // BYTES), p.reals)
 
 
 def _predictor(name: str, p: PredictTable) -> Cost:

@@ -23,6 +23,7 @@ from hullguard.design.predict import Bounds, predict_table, predicted_groups
 from hullguard.design.protection import LISTED, NONE
 from hullguard.design.reach import faulty_reach, largest, reach
 from hullguard.design.search import FaultPath, between_events, fault_delays, search, smallest_faults
+from hullguard.design.statistic import StatisticTable, known_of, statistic_checks, statistic_table
 from hullguard.design.store import Stored, StoredObserver
 from hullguard.design.tables import (
     GeneratorTable,
@@ -103,7 +104,7 @@ class Design:
         names = [f"observer {i + 1}" for i in range(len(self.generators))]
         for bank in used_banks(self.model, self.stored):
             names.append(f"bank of {len(bank.weight)}" if bank.hypothesis is None else f"not {self.model.faults[bank.hypothesis].name}")
-        return names
+        return names + [f"polynomial filter of degree {p.degree}" + (", bounded" if p.bounded else "") for p in self.tables.polynomials]
 
 
 def usual_radius(model: Model, slew: Array | None = None) -> Array:
@@ -299,12 +300,14 @@ def finish(model: Model, stored: Stored) -> Design:
     values = np.array([largest(model, stored.signal_reach, i) for i in range(len(model.signals))])
     uios = tuple(uio_generator.finish(model, i, u, derived.usual, values, stored.state_range) for i, u in enumerate(stored.uios))
     generators = tuple(_generator(model, i, stored, derived) for i in range(len(model.observers))) + tuple(_uio_generator(model, u) for u in uios)
-    tables = _tables(model, groups, generators, derived, _banks(model, stored, derived))
+    known = known_of(groups, derived.usual.tolist())
+    polynomials = tuple(statistic_table(model, spec, known) for spec in model.polynomials)
+    tables = _tables(model, groups, generators, derived, _banks(model, stored, derived), polynomials)
     _unique_ids(model, tables)
     bound = load_bound(tables, model.bitrate_bps, model.sample_time_s, model.data_bitrate_bps)
     checks = [c for i, u in enumerate(uios) for c in uio_generator.checks(i, u)]
     checks += [c for i, g in enumerate(generators[: len(model.observers)]) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
-    checks += _model_checks(model, stored, tables, bound, generators)
+    checks += statistic_checks(model, known) + _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
     tables, lost = _fixed(model, generators, tables)
     return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states, lost, uios)
@@ -529,12 +532,15 @@ def _banks(model: Model, stored: Stored, derived: Derived) -> tuple[BankTable, .
     return tuple(made)
 
 
-def _tables(model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...], derived: Derived, banks: tuple[BankTable, ...]) -> Tables:
+def _tables(
+    model: Model, groups: tuple[GroupTable, ...], generators: tuple[Generator, ...], derived: Derived, banks: tuple[BankTable, ...], polynomials: tuple[StatisticTable, ...]
+) -> Tables:
     made = tuple(_generator_table(model, g, derived) for g in generators)
     verdict, status = verdict_table(model), message_table("status", model.status, 8)
     return Tables(
-        model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch, banks
-    )
+        model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch, banks,
+        polynomials=polynomials,
+    )  # fmt: skip
 
 
 def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, generators: tuple[Generator, ...]) -> list[Check]:

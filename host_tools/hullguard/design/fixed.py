@@ -112,6 +112,8 @@ class _Signals:
 
 
 def _refuse(tables: Tables, where: str) -> None:
+    if tables.polynomials:
+        raise InputError(f"{where}: not for fixed point: the moments of a polynomial filter have no proven range; use float32")
     if any(isinstance(g, ModalGeneratorTable) for g in tables.generators):
         raise InputError(f"{where}: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32")
     if any(g.zonotope is not None for g in tables.generators):

@@ -11,13 +11,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hullguard.core.library import library
 from hullguard.errors import InputError
-from hullguard.model.table import Array
+
+if TYPE_CHECKING:
+    from hullguard.model.table import Array  # model files need this module to be read
 
 Exponents = tuple[int, ...]
 
@@ -144,6 +147,11 @@ class Noise:
             return 0.0 if order % 2 else float(self.scale**order) * SYMMETRIC[self.kind](self.values, order)
         return float(sum(p * float(v**order) for v, p in zip(self.values, self.weights, strict=True)))
 
+    def scaled(self, factor: float) -> Noise:
+        """In another unit."""
+        values = tuple(v * factor for v in self.values) if self.kind == "atoms" else self.values
+        return replace(self, scale=self.scale * factor, values=values)
+
 
 def _student(values: tuple[float, ...], order: int) -> float:
     freedom = values[0]
@@ -197,6 +205,13 @@ def exponential(deviation: float) -> Noise:
 def uniform(half: float) -> Noise:
     """Uniform within +-half."""
     return Noise("uniform", half)
+
+
+def two_point(deviation: float, probability: float) -> Noise:
+    """Two values, the upper one with this probability."""
+    other = 1.0 - probability
+    spread = deviation / math.sqrt(probability * other)
+    return Noise("atoms", 0.0, (-probability * spread, other * spread), (other, probability))
 
 
 def atoms(values: Sequence[float], weights: Sequence[float]) -> Noise:

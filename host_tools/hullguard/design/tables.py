@@ -15,6 +15,7 @@ from hullguard.design.arith import U32, nearest32, up32
 from hullguard.design.bank_types import BankTable
 from hullguard.design.ids import SURE
 from hullguard.design.protection import NONE, ProtectionTable, own_protection
+from hullguard.design.statistic import STATISTICS, StatisticTable
 from hullguard.design.zonotope_table import ZonotopeTable
 from hullguard.errors import InputError
 from hullguard.model.network import Field
@@ -193,6 +194,7 @@ class Tables:
     not_fixed: str = ""  # why there is none
     units: tuple[int, ...] = ()  # of fixed point: numbers are times 2^unit; the signal vector, then the residuals
     float_hash: int | None = None  # of fixed point: it is the same model
+    polynomials: tuple[StatisticTable, ...] = ()
 
     @property
     def signals(self) -> int:
@@ -209,7 +211,7 @@ class Tables:
         """Rows of the ring of radii."""
         taps = [max(g.taps) + 1 for g in self.generators if g.zonotope is None]
         rewinds = [g.interval_max + 1 for g in self.groups] if any(g.zonotope is not None for g in self.generators) else []
-        return max(taps + rewinds + [b.window for b in self.banks])
+        return max(taps + rewinds + [b.window for b in self.banks] + [1] * len(self.polynomials))
 
     @property
     def window(self) -> int:
@@ -217,19 +219,19 @@ class Tables:
         return max((b.window for b in self.banks), default=0)
 
     @property
-    def judging(self) -> tuple[GeneratorTable | BankTable, ...]:
-        """Residual generators, then banks: what the decision listens to."""
-        return (*self.generators, *self.banks)
+    def judging(self) -> tuple[GeneratorTable | BankTable | StatisticTable, ...]:
+        """Residual generators, then banks, then polynomial filters: what the decision listens to."""
+        return (*self.generators, *self.banks, *self.polynomials)
 
     @property
     def judged(self) -> int:
         """How many they are."""
-        return len(self.generators) + len(self.banks)
+        return len(self.judging)
 
     @property
     def residuals(self) -> int:
-        """Residuals of all generators together, and one for each bank."""
-        return sum(len(g.output) for g in self.generators) + len(self.banks)
+        """Residuals of all generators together, one for each bank, and a polynomial filter's statistics."""
+        return sum(len(g.output) for g in self.generators) + len(self.banks) + len(STATISTICS) * len(self.polynomials)
 
     @property
     def reals(self) -> int:
@@ -237,7 +239,7 @@ class Tables:
         own = sum(2 * len(g.state) + len(g.signal) for g in self.generators)
         own += sum(len(g.output) if g.zonotope is None else g.zonotope.reals for g in self.generators)
         own += sum(len(g.mode_decay) for g in self.generators if isinstance(g, ModalGeneratorTable))
-        own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors)
+        own += sum(2 * len(p.state) + len(p.input) + len(p.output) for p in self.predictors) + sum(p.reals for p in self.polynomials)
         return 2 * self.width + 2 * self.residuals + 2 * self.signals + self.width * self.history + self.signals * self.window + own
 
     @property
@@ -255,7 +257,10 @@ class Tables:
         """32 bits that change with any number above: host and node compare them."""
         if self.float_hash is not None:
             return self.float_hash
-        text = json.dumps(_plain(replace(self, fixed=None, not_fixed="")), sort_keys=True, separators=(",", ":"))
+        plain = _plain(replace(self, fixed=None, not_fixed=""))
+        if not self.polynomials:
+            del plain["polynomials"]  # a model without them is what it was before there were any
+        text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
 
 

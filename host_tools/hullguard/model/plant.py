@@ -14,6 +14,7 @@ import scipy.linalg
 
 from hullguard.errors import InputError
 from hullguard.model.builders import BUILDERS, Interval
+from hullguard.model.polynomial import Nonlinear
 from hullguard.model.table import Array, Table
 from hullguard.model.uio import UnknownInputs, read_unknown
 from hullguard.model.uncertain import drawn, enclosure, zero_order_hold
@@ -50,6 +51,7 @@ class Plant:
     interval: Interval | None  # what dA and dB were made from; None for a certain plant
     unknown: UnknownInputs | None  # inputs that nobody knows, of a model of kind "uio"
     hold_s: float | None  # sample time of the zero-order hold between the interval and A, B; None where the model gives discrete matrices
+    nonlinear: Nonlinear | None = None  # of a model of kind "polynomial": the matrices are its first derivatives
 
     @property
     def n(self) -> int:

@@ -15,6 +15,7 @@ import numpy as np
 
 from hullguard.design.protection import MODAL, MODES, NIBBLE_ID_MAX, NONE, PROFILES
 from hullguard.errors import InputError
+from hullguard.model import polynomial
 from hullguard.model.builders_car import TYRE
 from hullguard.model.choice import read_orders, read_parity, read_poles
 from hullguard.model.detector import DetectorSpec, read_detector
@@ -208,6 +209,7 @@ class Model:
     scenarios: tuple[Scenario, ...]
     sha256: str  # of everything that a design depends on
     uios: tuple[UioSpec, ...] = ()
+    polynomials: tuple[polynomial.FilterSpec, ...] = ()
 
     @property
     def outputs(self) -> list[int]:
@@ -365,7 +367,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     if top.whole("schema", 1, 10_000) != SCHEMA:
         raise top.error("schema", f"this version reads schema {SCHEMA}")
     name = _name(top)
-    kind = top.text("kind", choices=["linear", KIND])
+    kind = top.text("kind", choices=["linear", KIND, polynomial.KIND])
     sample_time_s = top.number("sample_time_s", 1e-6, 3600.0)
     bus = top.table("bus", optional=True)
     bitrate = bus.whole("bitrate_bps", 10_000, 8_000_000, 500_000)
@@ -382,7 +384,10 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     if not outputs:
         raise InputError(f'{path.name}: no signal has role = "output": there is nothing to check')
     noise = {s.name: s.noise for s in signals}
-    plant = read_plant(top.table("plant"), outputs, inputs, noise, sample_time_s)
+    if kind == polynomial.KIND:
+        plant = polynomial.read_nonlinear(top.table("plant"), outputs, inputs, sample_time_s, path)
+    else:
+        plant = read_plant(top.table("plant"), outputs, inputs, noise, sample_time_s)
     faults = tuple(_read_fault(t, signals) for t in top.tables("faults", optional=True))
     _unique([f.name for f in faults] + [s.name for s in signals], f"{path.name}: faults and signals")
     if len(faults) > FAULTS_MAX:
@@ -396,7 +401,8 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
             if n not in [f.name for f in faults]:
                 raise inner.error(f"{key}.faults", f"'{n}' is not one of {', '.join(f.name for f in faults) or 'none'}")
     uios = _read_uios(inner, plant, signals, faults) if kind == KIND else ()
-    observers = _read_observers(inner, outputs, inputs, faults) if kind != KIND else ()
+    filters = _read_filters(inner, detector, outputs, faults) if kind == polynomial.KIND else ()
+    observers = _read_observers(inner, outputs, inputs, faults) if kind not in (KIND, polynomial.KIND) else ()
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
     _free(path, network, [("verdict", verdict), ("status", status), *((g.name, g.frame) for g in groups)])
     scenarios = _read_scenarios(top, path)
@@ -426,6 +432,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         scenarios=scenarios,
         sha256=_fingerprint(data | {"network": network.plain()} if network.taken else data),
         uios=uios,
+        polynomials=filters,
     )
 
 
@@ -437,6 +444,18 @@ def _read_uios(inner: Table, plant: Plant, signals: tuple[Signal, ...], faults: 
     made = read_uios(inner, plant.states, [s.name for _, s in named], faults, [i for i, _ in named])
     if not 1 <= len(made) <= GENERATORS_MAX:
         raise inner.error("uio", f"{len(made)} observers; 1 .. {GENERATORS_MAX} are possible")
+    inner.close()
+    return made
+
+
+def _read_filters(inner: Table, detector: DetectorSpec, outputs: list[str], faults: tuple[Fault, ...]) -> tuple[polynomial.FilterSpec, ...]:
+    """The filters of a model of kind "polynomial"."""
+    for key, asked in (("bank", detector.bank), ("isolation", detector.isolation), ("prediction", detector.prediction), ("threshold", detector.threshold != "exact")):
+        if asked:
+            raise inner.error(key, "it needs the bounds of a linear plant; remove it, or make the model linear")
+    made = polynomial.read_filters(inner, outputs, faults)
+    if len(made) > GENERATORS_MAX:
+        raise inner.error("polynomial", f"{len(made)} filters; 1 .. {GENERATORS_MAX} are possible")
     inner.close()
     return made
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from hullguard.errors import InputError
 from hullguard.model.detector import PUBLISHED
 from hullguard.report.page import AMBER, BLUE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, num, page, percent, picture, plural, table, tile
-from hullguard.report.run_report import UNSOUND
+from hullguard.report.run_report import STATISTICAL, UNSOUND
 
 COLOURS = (BLUE, RED, GREEN, PINK, AMBER, SKY, INK, MUTED)
 LINES_MAX = len(COLOURS)
@@ -68,7 +68,9 @@ def _body(result: dict[str, Any]) -> Iterator[str]:
     thresholds = result["thresholds"]
     if PUBLISHED in thresholds:
         yield f"<aside><p>{'In the cases with the threshold ' + PUBLISHED + ': n' + UNSOUND[1:] if len(thresholds) > 1 else UNSOUND}</p></aside>"
-    if thresholds != [PUBLISHED]:
+    if result.get("basis") == "statistical":
+        yield f"<aside><p>{STATISTICAL}</p></aside>"
+    elif thresholds != [PUBLISHED]:
         yield f"<p>{GUARANTEE}</p>"
     if "attacked" in result:
         header = ("runs", "#number", "#largest |r|/J", "#once the start is over", "#its mean over the runs")

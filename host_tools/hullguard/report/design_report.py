@@ -16,12 +16,12 @@ from hullguard.bus.bits import worst_bit_times, worst_bits
 from hullguard.design.design import Design, Generator
 from hullguard.design.ids import ERRORS, undetected_patterns
 from hullguard.design.isolation import Pair
-from hullguard.design.judges import BANK, HYPOTHESIS, judges
+from hullguard.design.judges import BANK, HYPOTHESIS, STATISTIC, judges
 from hullguard.design.protection import MODAL, NONE
 from hullguard.design.tables import GeneratorTable, MessageTable
 from hullguard.errors import InputError
 from hullguard.model.table import Array
-from hullguard.report import uio_design
+from hullguard.report import polynomial_design, uio_design
 from hullguard.report.design_banks import banks_section, cost_section, derived_section, isolability_section, uncertain_names
 from hullguard.report.page import AMBER, BLUE, EDGE, GREEN, INK, MUTED, PINK, RC, RED, SKY, Cell, esc, num, page, percent, picture, plural, table, tile
 
@@ -66,6 +66,7 @@ def _body(design: Design, pairs: Sequence[Pair]) -> Iterator[str]:
         if folded:
             yield "</details>"
     yield from uio_design.section(design)
+    yield from polynomial_design.section(design)
     yield from banks_section(design)
     yield from isolability_section(design, pairs)
     yield from derived_section(design)
@@ -100,7 +101,7 @@ def _summary(design: Design) -> Iterator[str]:
     if best:
         name, size = max(best.items(), key=lambda kv: kv[1])
         tiles.append(tile("hardest fault asked for", num(size), f"{name}: smallest size that is found"))
-    full = max((b.window for b in design.tables.banks), default=0)
+    full = max([b.window for b in design.tables.banks] + [p.settle for p in design.tables.polynomials], default=0)
     rest, moving = (max([full, *(ready(g) for g in design.tables.generators)]) for ready in (_ready_rest, _ready_moving))
     tiles.append(tile("ready after", f"{rest} samples", f"from rest; {moving} in motion"))
     tiles.append(tile("longest history", f"{design.tables.history} samples", "of radii, in RAM"))
@@ -113,6 +114,7 @@ def _judging(design: Design) -> str:
     parts = [f"{plural(len(design.generators), 'residual generator')} with {plural(residuals, 'residual')}"] if design.generators else []
     parts += [f"a {j.name} certificates" for j in judges(design) if j.kind == BANK]
     isolating = sum(j.kind == HYPOTHESIS for j in judges(design))
+    parts += [j.name for j in judges(design) if j.kind == STATISTIC]
     return ", ".join([*parts, *([f"{plural(isolating, 'bank')} for isolation"] if isolating else [])])
 
 
@@ -250,7 +252,7 @@ def _faults(design: Design) -> str:
     best = _smallest(design)
     for i, f in enumerate(design.model.faults):
         seen = [str(k + 1) for k, t in enumerate(design.tables.generators) if t.faults >> i & 1]
-        seen += [j.name for j, t in zip(judges(design), design.tables.judging, strict=True) if j.kind == BANK and t.faults >> i & 1]
+        seen += [j.name for j, t in zip(judges(design), design.tables.judging, strict=True) if j.kind in (BANK, STATISTIC) and t.faults >> i & 1]
         asked = best.get(f.name)
         rows.append([f.name, f.type, design.model.signals[f.signal].name, ", ".join(seen) or Cell("none", "bad"), "not asked for" if asked is None else num(asked)])
     return (

@@ -8,10 +8,10 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from hullguard.design.judges import BANK
+from hullguard.design.judges import BANK, STATISTIC
 from hullguard.errors import InputError
 from hullguard.model.detector import PUBLISHED
-from hullguard.report import published, uio_section
+from hullguard.report import polynomial_section, published, uio_section
 from hullguard.report import run_figures as draw
 from hullguard.report.page import RC, Cell, esc, num, page, percent, picture, plural, table, tile
 from hullguard.report.run_data import FaultRun, Run, read_run
@@ -39,6 +39,10 @@ UNSOUND = (
     "Not guaranteed here: that there is no false alarm. The threshold is the publication's zonotope, which drops generators instead of covering them and so can be "
     "smaller than what a healthy plant can show. It is there for comparison; detector.threshold exact or zonotope gives the guarantee."
 )
+STATISTICAL = (
+    "Not guaranteed: that there is no false alarm. The thresholds of a polynomial filter hold with a probability that follows from the moments of the noise the model declares; "
+    "an alarm means that a healthy plant would hardly have shown this. Verdicts that rest on such a filter alone say so: their basis is statistical."
+)
 LIMITS = (
     "Not guaranteed: that every fault is found (one that stays below the thresholds is not), or that frames are authentic: the check protects against errors, "
     "not against an attacker."
@@ -50,6 +54,7 @@ CANDIDATES = (
 )
 HYPOTHESES = "Above its threshold “not X” has shown that no course of fault X explains what was received."
 MOVING = "The threshold moves: it is the largest value a healthy plant can show, given what the detector knows."
+MOVING_STATISTICAL = "The thresholds are levels that a healthy plant seldom reaches; the plain one moves with what the filter expects and with the radii."
 MOVING_PUBLISHED = "The threshold moves with what the detector knows."
 BAND = "The detector works on values and radii only: the true reading has to lie in the band. A sensor's fault is in the reading that is sent, and in the band."
 
@@ -58,7 +63,7 @@ def write_run_report(directory: Path) -> Path:
     """Read a finished run's directory and write report.html into it."""
     run = read_run(directory)
     with mpl.rc_context(RC):
-        text = page(f"Run of {run.info['model']}", _body(run, uio_section.read_estimates(directory, run.info)))
+        text = page(f"Run of {run.info['model']}", _body(run, uio_section.read_estimates(directory, run.info), polynomial_section.read_filters(directory, run.info)))
     path = directory / "report.html"
     _write(path, text.encode())
     return path
@@ -85,20 +90,21 @@ def _write(path: Path, data: bytes) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def _body(run: Run, estimates: Sequence[uio_section.Estimate]) -> Iterator[str]:
+def _body(run: Run, estimates: Sequence[uio_section.Estimate], filters: Sequence[polynomial_section.Filter]) -> Iterator[str]:
     yield from _summary(run)
     whole = draw.whole(run)
     shown, hidden, judges = draw.chosen_residuals(run)
     if run.before:
         yield from published.section(run)
     yield from uio_section.section(run, estimates)
+    yield from polynomial_section.section(run, filters)
 
     yield "<h2>Residuals and thresholds</h2>"
     left = ""
     if hidden:
         whose = f" ({plural(judges, 'generator')} as a whole)" if judges else ""
         left = f" {plural(hidden, 'residual')} not drawn here{whose}: those drawn alarmed first or came closest to their thresholds."
-    yield f"<p>A fault is declared when a residual leaves its threshold. {MOVING_PUBLISHED if run.info['threshold'] == PUBLISHED else MOVING}{esc(left)}</p>"
+    yield f"<p>A fault is declared when a residual leaves its threshold. {_moving(run)}{esc(left)}</p>"
     zoom = draw.close_up(run)
     if zoom:
         w, fault = zoom
@@ -163,6 +169,15 @@ def _body(run: Run, estimates: Sequence[uio_section.Estimate]) -> Iterator[str]:
     yield _communication(run)
     yield "<h2>The run</h2>"
     yield _facts(run)
+
+
+def _statistical(run: Run) -> bool:
+    return any(j.kind == STATISTIC for j in run.judges)
+
+
+def _moving(run: Run) -> str:
+    """What moves the thresholds."""
+    return MOVING_STATISTICAL if _statistical(run) else MOVING_PUBLISHED if run.info["threshold"] == PUBLISHED else MOVING
 
 
 def _causes(run: Run, whole: draw.Window, zoom: draw.Window | None) -> Iterator[str]:
@@ -239,7 +254,8 @@ def _summary(run: Run) -> Iterator[str]:
     yield '<div class="tiles">' + "".join(_tiles(run)) + "</div>"
     if run.faults:
         yield _fault_table(run)
-    yield f'<aside><p>{esc(UNSOUND if info["threshold"] == PUBLISHED else GUARANTEE)}</p><p class="note">{esc(LIMITS)}</p></aside>'
+    promise = STATISTICAL if _statistical(run) else UNSOUND if info["threshold"] == PUBLISHED else GUARANTEE
+    yield f'<aside><p>{esc(promise)}</p><p class="note">{esc(LIMITS)}</p></aside>'
 
 
 def _tiles(run: Run) -> Iterator[str]:
