@@ -536,7 +536,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 1U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 5U, .latch = false},
     .history = 1U, .window = 0U, .residuals = 3U,
-    .codes = 6U, .reals = 1069UL, .sums = 0UL,
+    .codes = 4U, .reals = 1073UL, .sums = 0UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -589,7 +589,7 @@ hg_status hg_battery_cell_node_start(hg_battery_cell_node *self, hg_start how)
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = NULL, .hull = NULL, .zonotope = NULL, .bank = NULL,
                      .polynomial = self->polynomial,
-                     .alarm = self->alarm, .code = self->code, .codes = 6U, .real = self->real, .reals = 1069UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 4U, .real = self->real, .reals = 1073UL,
                      .sum = NULL, .sums = 0UL},
         .link = self->link,
         .closing = self->closing,

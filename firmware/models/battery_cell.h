@@ -14,6 +14,36 @@
 #if !HG_WITH_POLYNOMIAL
 #error "model battery_cell needs HG_WITH_POLYNOMIAL"
 #endif
+#if (HG_ONLY_GROUPS != 0U) && (HG_ONLY_GROUPS != 2U)
+#error "model battery_cell needs HG_ONLY_GROUPS of 2, or 0"
+#endif
+#if (HG_ONLY_GROUP_SIGNALS != 0U) && (HG_ONLY_GROUP_SIGNALS != 1U)
+#error "model battery_cell needs HG_ONLY_GROUP_SIGNALS of 1, or 0"
+#endif
+#if (HG_ONLY_WIDTH != 0U) && (HG_ONLY_WIDTH != 2U)
+#error "model battery_cell needs HG_ONLY_WIDTH of 2, or 0"
+#endif
+#if (HG_ONLY_HISTORY != 0U) && (HG_ONLY_HISTORY != 1U)
+#error "model battery_cell needs HG_ONLY_HISTORY of 1, or 0"
+#endif
+#if HG_ONLY_GENERATORS != 0U
+#error "model battery_cell needs HG_ONLY_GENERATORS of 0"
+#endif
+#if (HG_ONLY_JUDGED != 0U) && (HG_ONLY_JUDGED != 1U)
+#error "model battery_cell needs HG_ONLY_JUDGED of 1, or 0"
+#endif
+#if HG_ONLY_ORDER != 0U
+#error "model battery_cell needs HG_ONLY_ORDER of 0"
+#endif
+#if HG_ONLY_RESIDUALS != 0U
+#error "model battery_cell needs HG_ONLY_RESIDUALS of 0"
+#endif
+#if HG_ONLY_IN_ORDER != 0U
+#error "model battery_cell needs HG_ONLY_IN_ORDER of 0"
+#endif
+#if HG_ONLY_READ != 0U
+#error "model battery_cell needs HG_ONLY_READ of 0"
+#endif
 #if HG_REAL_Q31
 #error "battery_cell.toml: not for fixed point: the moments of a polynomial filter have no proven range; use float32"
 #endif
@@ -68,9 +98,9 @@ typedef struct {
     hg_statistic polynomial[1];
     hg_alarm    alarm[1];
     hg_link     link[HG_BATTERY_CELL_GROUPS];
-    int32_t     code[6];
+    int32_t     code[4];
     int32_t     closing[1];
-    hg_real     real[1069];
+    hg_real     real[1073];
 } hg_battery_cell_node;
 
 /** Start a detector node; self->node is then ready for hg_node_receive().

@@ -427,7 +427,7 @@ static const hg_detector_config detector = {
     .decision = {.generators = 1U, .feeds = feeds, .faults = moved_by,
                  .up = 1U, .down = 5U, .latch = false},
     .history = 1U, .window = 0U, .residuals = 3U,
-    .codes = 6U, .reals = 325UL, .sums = 0UL,
+    .codes = 4U, .reals = 329UL, .sums = 0UL,
 };
 
 /* verdict_data_ids [HG_E2E_IDS]: data identifiers by counter value */
@@ -480,7 +480,7 @@ hg_status hg_cubic_suspension_node_start(hg_cubic_suspension_node *self, hg_star
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = NULL, .hull = NULL, .zonotope = NULL, .bank = NULL,
                      .polynomial = self->polynomial,
-                     .alarm = self->alarm, .code = self->code, .codes = 6U, .real = self->real, .reals = 325UL,
+                     .alarm = self->alarm, .code = self->code, .codes = 4U, .real = self->real, .reals = 329UL,
                      .sum = NULL, .sums = 0UL},
         .link = self->link,
         .closing = self->closing,
