@@ -15,6 +15,7 @@ from filters import POLYNOMIAL, fusion, polynomial
 from needs import needs
 from size import Size, judged, versions, written
 from stack import StackError, compiled, deepest, disassembled, registers, run_time, symbols
+from step_size import code, flash, tables
 
 from hullguard.design.cost import costs
 from hullguard.design.design import design
@@ -170,6 +171,17 @@ def test_the_bound_is_one(target: str, cross: str, emulator: str) -> None:
     bound = deepest("main", graph, run_time(elf, cross, symbols(elf, cross)))[0]
     assert painter is not None
     assert bound / 2 <= used - painter <= bound, (used, painter, bound)
+
+
+def test_the_flash_of_a_step() -> None:
+    """What a step calls and reads, and nothing of a start or a frame."""
+    elf = BENCH / "cortex_m4f-f32/platoon/detector.elf"
+    functions_, tables_ = code(elf, "arm-none-eabi-"), tables(elf)
+    assert {"hg_detector_step", "hg_hold_step", "hg_hull_step", "hg_residual_step", "hg_decision_step"} <= functions_.keys()
+    assert not {"main", "hg_hold_receive", "hg_detector_start"} & functions_.keys()
+    assert tables_["generator1_weight"] == 74 * 4 and not {"memory", "measurement_scale", "generator1_signal"} & tables_.keys()
+    grown, _ = judged([replace(SIZE, step=flash(elf, "arm-none-eabi-"))], tomllib.loads(written([replace(SIZE, step=100)], {})))
+    assert grown == [f"cortex_m0-f32 platoon-node: step grew from 100 to {flash(elf, 'arm-none-eabi-')} bytes, by {flash(elf, 'arm-none-eabi-') - 100}"]
 
 
 def test_a_byte_too_many_is_red() -> None:
