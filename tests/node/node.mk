@@ -4,7 +4,7 @@
 BUS_TIMER := $(BUILD)/node/bus_timer
 BUS_TIMER_OBJECTS := $(patsubst %.c,$(BUILD)/apps-f32/%.o,$(wildcard firmware/src/*.c firmware/models/*.c hal/socketcan/*.c))
 VIRTUAL_NODE := $(BUILD)/node/virtual_node
-VIRTUAL_NODE_OBJECTS := $(patsubst %.c,$(BUILD)/apps-f32/%.o,$(wildcard firmware/src/*.c firmware/models/*.c hal/loopback/*.c) firmware/apps/models.c)
+VIRTUAL_NODE_OBJECTS := $(patsubst %.c,$(BUILD)/apps-f32/%.o,$(wildcard firmware/src/*.c firmware/models/*.c hal/loopback/*.c) $(patsubst %,firmware/apps/%.c,models tracker_models units))
 OBJECTS += $(BUS_TIMER).o $(VIRTUAL_NODE).o
 
 $(BUS_TIMER).o $(VIRTUAL_NODE).o: $(BUILD)/node/%.o: tests/node/%.c tests/node/node.mk
