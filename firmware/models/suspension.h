@@ -50,9 +50,6 @@
 #if HG_ONLY_READ != 0U
 #error "model suspension needs HG_ONLY_READ of 0"
 #endif
-#if HG_REAL_Q31
-#error "suspension.toml: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32"
-#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -93,6 +90,8 @@ enum {
     {"deflection1_m", "tyre1_m", "wheel1_mps", "body1_mps", "force1_n"}
 #define HG_SUSPENSION_GROUP_NAMES \
     {"corner1", "control"}
+/* Initialiser of the signals' units: with HG_REAL_Q31 a value or radius x is held as the integer x 2^(31 - unit), below 2^31. */
+#define HG_SUSPENSION_UNITS {-1, -3, 4, 3, 13}
 #define HG_SUSPENSION_FAULT_NAMES \
     {"actuator1", "body1_sensor", "wheel1_sensor", "tyre1_sensor", "deflection1_sensor"}
 

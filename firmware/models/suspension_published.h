@@ -48,10 +48,6 @@
 #if HG_ONLY_READ != 0U
 #error "model suspension_published needs HG_ONLY_READ of 0"
 #endif
-#if HG_REAL_Q31
-#error "suspension_published.toml: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use \
-       float32"
-#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -88,6 +84,8 @@ enum {
     {"y1", "y2", "y3", "force1_n"}
 #define HG_SUSPENSION_PUBLISHED_GROUP_NAMES \
     {"measurement", "control"}
+/* Initialiser of the signals' units: with HG_REAL_Q31 a value or radius x is held as the integer x 2^(31 - unit), below 2^31. */
+#define HG_SUSPENSION_PUBLISHED_UNITS {2, 2, 2, 11}
 #define HG_SUSPENSION_PUBLISHED_FAULT_NAMES \
     {"actuator1", "y3_sensor"}
 

@@ -11,8 +11,13 @@
 #include "hullguard/uio.h"
 
 #define HG_SUSPENSION_PUBLISHED_UIOS 1U /* observers */
+#if !HG_REAL_Q31
 #define HG_SUSPENSION_PUBLISHED_UIO_ISOLATIONS 0U /* estimates of actuators' faults that are told apart from weaker parts */
+#endif
 #define HG_SUSPENSION_PUBLISHED_UIO_ESTIMATES 7U /* of all observers, one after another */
+/* Initialiser of the estimates' units: with HG_REAL_Q31 an estimate or radius x is held as the integer x 2^(31 - unit); a radius of
+ * HG_REAL_MAX says nothing. */
+#define HG_SUSPENSION_PUBLISHED_UIO_UNITS {17, 3, 8, 3, 4, 3, 4}
 
 /* Places of the estimates: faults of actuators, of sensors, unknown inputs, states; of each observer in turn. */
 enum {

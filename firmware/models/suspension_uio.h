@@ -10,8 +10,13 @@
 #include "hullguard/uio.h"
 
 #define HG_SUSPENSION_UIOS 2U /* observers */
+#if !HG_REAL_Q31
 #define HG_SUSPENSION_UIO_ISOLATIONS 1U /* estimates of actuators' faults that are told apart from weaker parts */
+#endif
 #define HG_SUSPENSION_UIO_ESTIMATES 13U /* of all observers, one after another */
+/* Initialiser of the estimates' units: with HG_REAL_Q31 an estimate or radius x is held as the integer x 2^(31 - unit); a radius of
+ * HG_REAL_MAX says nothing. */
+#define HG_SUSPENSION_UIO_UNITS {16, 4, 0, 4, -2, 5, 17, 6, 10, 0, 6, -1, 5}
 
 /* Places of the estimates: faults of actuators, of sensors, unknown inputs, states; of each observer in turn. */
 enum {
@@ -31,17 +36,26 @@ enum {
 };
 
 extern const hg_uio_config hg_suspension_uio_config[2];
+#if !HG_REAL_Q31
 extern const hg_isolate_config hg_suspension_uio_isolate_config[1];
+#endif
 
 /* Memory of all of them. */
 typedef struct {
     hg_uio       uio[2];
+#if !HG_REAL_Q31
     hg_isolate   isolate[1];
     hg_isolation found[1];
+#endif
     hg_real      estimate[13];
     hg_real      radius[13];
+#if HG_REAL_Q31
+    hg_real      real[HG_UIO_REALS(2U, 5U, 6U, 2U) +
+                      HG_UIO_REALS(8U, 5U, 7U, 8U)];
+#else
     hg_real      real[HG_UIO_REALS(2U, 5U, 6U, 2U) + HG_ISOLATE_REALS(2U, 4U) +
                       HG_UIO_REALS(8U, 5U, 7U, 8U)];
+#endif
 } hg_suspension_uio;
 
 /** Begin, beside a detector of the same model that has just been started.

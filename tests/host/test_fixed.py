@@ -419,7 +419,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], str, str]] = {
     "zonotope": ("platoon", ("detector.threshold=zonotope",), "columns of a zonotope", 'detector.threshold = "exact"'),
     "prediction": ("platoon", ("detector.prediction=true",), "prediction of 'measurement'", "detector.prediction = false"),
     "float32": ("platoon", ("signals.0.wire=float32", "groups.0.frame.fd=true"), "a float32 on the wire", "integer field"),
-    "unknown inputs": ("suspension", (), "modes of its thresholds", "use float32"),
+    "unknown inputs": ("suspension", ("signals.deflection1_m.wire=float32",), "a float32 on the wire", "integer field"),
 }
 
 

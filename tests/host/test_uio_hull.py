@@ -75,13 +75,13 @@ def made(request: pytest.FixtureRequest, models: Models) -> Design:
 
 
 @pytest.mark.parametrize("road", sorted(ROADS))
-@pytest.mark.parametrize("real", ["f32", "f64"])
+@pytest.mark.parametrize("real", ["f32", "f64", "q31"])
 def test_no_estimate_leaves_its_radius(made: Design, road: str, real: str) -> None:
     rng = np.random.default_rng([SEED, len(road)])
     run = course(made, ROADS[road], 1200, SEED % 1000)
     value, radius = errors(made, run, rng)
     for u in made.uios:
-        found = Uio(library(real), uio_table(u), width=len(made.model.signals)).run(value, radius)
+        found = Uio(library(real), uio_table(u, real), width=len(made.model.signals)).run(value, radius)
         ratio = np.abs(found.estimate - truths(made, u, run)) / found.radius
         assert ratio.max() <= 1.0, f"{u.names[int(ratio.max(0).argmax())]} at {int(ratio.max(1).argmax())}"
         assert found.refused == 0

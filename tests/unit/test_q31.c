@@ -1,5 +1,5 @@
 /** @file
- *  real.h for Q31, and what runs on it: the primitives at every edge, codes, residual, hull and hold, against whole numbers of 128 bits that are
+ *  real.h for Q31, and what runs on it: the primitives at every edge, codes, residual, hull, observer and hold, against whole numbers of 128 bits that are
  *  divided and rounded by a rule of their own. Built for HG_REAL_Q31 alone. */
 #include "support.h"
 
@@ -8,6 +8,7 @@
 #include "hullguard/hold.h"
 #include "hullguard/hull.h"
 #include "hullguard/residual.h"
+#include "hullguard/uio.h"
 
 #if !HG_REAL_Q31
 #error "this test is for the fixed-point number type"
@@ -309,12 +310,13 @@ static void a_generator_is_its_equations_with_one_rounding_a_sum(void **state)
 #define LENGTH 8U
 #define SETTLE 5U
 #define SAMPLES 120U
+#define MODES 2U
 
 typedef struct {
     uint8_t signal[IN];
     uint8_t taps[IN];
     size_t  all; /* numbers of one residual */
-    hg_real weight[OUT * IN * LENGTH]; /* by residual, signal and lag; behind a signal's lags its tail */
+    hg_real weight[OUT * ((IN * LENGTH) + MODES)]; /* by residual: by signal and lag, behind a signal's lags its tail; then of the modes */
     hg_real laid_out[OUT * IN * LENGTH];
     hg_real rest[SETTLE * OUT];
     hg_real moving[SETTLE * OUT];
@@ -322,7 +324,17 @@ typedef struct {
     hg_real moving_left[OUT];
     hg_real bias[OUT];
     hg_real decay[OUT];
+    hg_real mode_decay[MODES];
+    hg_real mode_input[MODES * IN];
+    hg_real mode_output[OUT * MODES];
+    hg_real mode_rest[MODES];
+    hg_real mode_moving[MODES];
 } tables;
+
+static const hg_real *row_of(const tables *t, size_t i)
+{
+    return &t->weight[i * (t->all + MODES)];
+}
 
 static void draw_positive(uint32_t *random, hg_real *x, size_t n, hg_real most)
 {
@@ -340,13 +352,20 @@ static void draw_tables(uint32_t *random, tables *t)
         t->all += t->taps[g] + 1U;
     }
     for (size_t i = 0U; i < OUT; i++) {
-        draw_terms(random, &t->weight[i * t->all], t->all, true);
+        draw_terms(random, &t->weight[i * (t->all + MODES)], t->all + MODES, true);
+        (void)memcpy(&t->mode_output[i * MODES], &row_of(t, i)[t->all], MODES * sizeof(hg_real));
     }
+    for (size_t m = 0U; m < MODES; m++) {
+        draw_terms(random, &t->mode_input[m * IN], IN, true);
+    }
+    draw_positive(random, t->mode_decay, MODES, HG_REAL_MAX);
+    draw_positive(random, t->mode_rest, MODES, HG_REAL_MAX / 4);
+    draw_positive(random, t->mode_moving, MODES, HG_REAL_MAX);
     size_t to = 0U;
     for (size_t i = 0U; i < OUT; i += 2U) {
         for (size_t at = 0U; at < t->all; at++) { /* signal after signal, lag after lag */
             for (size_t n = i; (n < OUT) && (n < (i + 2U)); n++) {
-                t->laid_out[to] = t->weight[(n * t->all) + at];
+                t->laid_out[to] = row_of(t, n)[at];
                 to++;
             }
         }
@@ -366,7 +385,7 @@ static hg_real at_most(wide x)
 
 static wide sum_of_taps(const tables *t, const hg_real (*past)[IN], size_t k, size_t i)
 {
-    const hg_real *weight = &t->weight[i * t->all];
+    const hg_real *weight = row_of(t, i);
     wide sum = 0;
     for (size_t g = 0U; g < IN; g++) {
         for (size_t lag = 0U; lag < t->taps[g]; lag++) {
@@ -380,12 +399,22 @@ static wide sum_of_taps(const tables *t, const hg_real (*past)[IN], size_t k, si
 
 static wide sum_of_tails(const tables *t, const hg_real (*past)[IN], size_t k, size_t i)
 {
-    const hg_real *tail = &t->weight[i * t->all];
+    const hg_real *tail = row_of(t, i);
     wide sum = 0;
     for (size_t g = 0U; g < IN; g++) {
         tail = &tail[t->taps[g]];
         sum += (k >= t->taps[g]) ? ((wide)*tail * past[k - t->taps[g]][t->signal[g]]) : 0;
         tail++;
+    }
+    return sum;
+}
+
+/* What leaves the taps, into mode m. */
+static wide into_mode(const tables *t, const hg_real (*past)[IN], size_t k, size_t m)
+{
+    wide sum = 0;
+    for (size_t g = 0U; g < IN; g++) {
+        sum += (k >= t->taps[g]) ? ((wide)t->mode_input[(m * IN) + g] * past[k - t->taps[g]][t->signal[g]]) : 0;
     }
     return sum;
 }
@@ -404,12 +433,15 @@ static void a_threshold_is_its_formula_with_one_rounding_a_sum(void **state)
         const hg_start how = ((run % 2) == 0) ? HG_START_REST : HG_START_MOVING;
         const hg_hull_config config = {.residuals = OUT, .width = IN, .exponent = exponent, .signal = t.signal, .taps = t.taps, .weight = t.laid_out,
             .settle = SETTLE, .rest = t.rest, .rest_left = t.rest_left, .moving = t.moving, .moving_left = t.moving_left, .bias = t.bias,
-            .decay = t.decay};
+            .decay = t.decay, .modes = ((run % 4) < 2) ? 0U : MODES, .mode_decay = t.mode_decay, .mode_input = t.mode_input,
+            .mode_output = t.mode_output, .mode_rest = t.mode_rest, .mode_moving = t.mode_moving};
         hg_hull self;
         hg_ring ring;
         hg_real memory[IN * LENGTH];
-        hg_real theta[OUT];
+        hg_real theta[OUT + MODES];
         hg_real expected[OUT] = {0};
+        hg_real mode[MODES];
+        (void)memcpy(mode, (how == HG_START_REST) ? t.mode_rest : t.mode_moving, sizeof(mode));
         assert_status(HG_OK, hg_ring_start(&ring, IN, LENGTH, memory));
         assert_status(HG_OK, hg_hull_start(&self, &config, &ring, how, theta));
         for (size_t k = 0U; k < SAMPLES; k++) {
@@ -417,6 +449,11 @@ static void a_threshold_is_its_formula_with_one_rounding_a_sum(void **state)
             draw_positive(&random, past[k], IN, ((draw(&random) % 16U) == 0U) ? HG_REAL_MAX : most);
             assert_status(HG_OK, hg_ring_push(&ring, past[k]));
             hg_hull_step(&self, &ring, J);
+            for (size_t m = 0U; m < config.modes; m++) {
+                const wide leaving = into_mode(&t, (const hg_real(*)[IN])past, k, m);
+                mode[m] = at_most(divided((wide)t.mode_decay[m] * mode[m], 31U) + divided(leaving, (unsigned)(31 - exponent)));
+                assert_int_equal(mode[m], theta[OUT + m]);
+            }
             for (size_t i = 0U; i < OUT; i++) {
                 const wide behind = sum_of_tails(&t, (const hg_real(*)[IN])past, k, i);
                 const bool rest = how == HG_START_REST;
@@ -425,8 +462,11 @@ static void a_threshold_is_its_formula_with_one_rounding_a_sum(void **state)
                 }
                 expected[i] = at_most(divided((wide)t.decay[i] * expected[i], 31U) + divided(behind, (unsigned)(31 - exponent)));
                 const hg_real bias = (k < SETTLE) ? (rest ? t.rest : t.moving)[(k * OUT) + i] : t.bias[i];
-                const wide taps = divided(sum_of_taps(&t, (const hg_real(*)[IN])past, k, i), (unsigned)(31 - exponent));
-                assert_int_equal(at_most(bias + taps + expected[i]), J[i]);
+                wide sum = sum_of_taps(&t, (const hg_real(*)[IN])past, k, i);
+                for (size_t m = 0U; m < config.modes; m++) {
+                    sum += (wide)t.mode_output[(i * MODES) + m] * mode[m];
+                }
+                assert_int_equal(at_most((wide)bias + divided(sum, (unsigned)(31 - exponent)) + expected[i]), J[i]);
                 assert_int_equal(expected[i], theta[i]);
                 largest += (J[i] == HG_REAL_MAX) ? 1U : 0U;
             }
@@ -453,6 +493,65 @@ static void tables_with_an_exponent_out_of_range_are_refused(void **state)
     assert_false(hg_hull_valid(&c, IN, LENGTH));
     t.decay[0] = -1;
     assert_false(hg_hull_valid(&c, IN, LENGTH));
+}
+
+/* ---- an unknown-input observer ---- */
+
+/* A signal that did not fit, or a state, says that nothing is known and begins again; an estimate that does not fit has no radius. */
+static void an_observer_is_its_generator_and_its_threshold_or_says_nothing(void **state)
+{
+    (void)state;
+    static tables t;
+    static hg_real A[ORDER * ORDER], B[ORDER * IN], C[OUT * ORDER], D[OUT * IN];
+    uint32_t random = seed_of_run(65U);
+    unsigned refused = 0U;
+    unsigned unheld = 0U;
+    for (int run = 0; run < 40; run++) {
+        draw_tables(&random, &t);
+        draw_rows(&random, A, ORDER, B, IN, ORDER);
+        draw_rows(&random, C, ORDER, D, IN, OUT);
+        const hg_residual_config observer = {.order = ORDER, .residuals = OUT, .width = IN, .signal = t.signal,
+            .state = {.rows = ORDER, .cols = ORDER, .exponent = 0, .data = A}, .input = {.rows = ORDER, .cols = IN, .exponent = 0, .data = B},
+            .output = {.rows = OUT, .cols = ORDER, .exponent = 1, .data = C}, .direct = {.rows = OUT, .cols = IN, .exponent = 1, .data = D}};
+        const hg_uio_config config = {.states = OUT, .observer = observer, .hull = {.residuals = OUT, .width = IN, .exponent = -1, .signal = t.signal,
+            .taps = t.taps, .weight = t.laid_out, .settle = SETTLE, .rest = t.rest, .rest_left = t.rest_left, .moving = t.moving,
+            .moving_left = t.moving_left, .bias = t.bias, .decay = t.decay, .modes = MODES, .mode_decay = t.mode_decay, .mode_input = t.mode_input,
+            .mode_output = t.mode_output, .mode_rest = t.mode_rest, .mode_moving = t.mode_moving}};
+        hg_uio self;
+        hg_residual generator;
+        hg_hull hull;
+        hg_ring ring;
+        hg_real rows[IN * LENGTH];
+        hg_real memory[HG_UIO_REALS(ORDER, IN, OUT, MODES)];
+        hg_real own[HG_UIO_REALS(ORDER, IN, OUT, MODES)];
+        assert_status(HG_OK, hg_ring_start(&ring, IN, LENGTH, rows));
+        assert_status(HG_OK, hg_uio_start(&self, &config, &ring, HG_START_MOVING, memory));
+        assert_status(HG_OK, hg_residual_start(&generator, &observer, own));
+        assert_status(HG_OK, hg_hull_start(&hull, &config.hull, &ring, HG_START_MOVING, &own[HG_RESIDUAL_REALS(ORDER, IN)]));
+        for (size_t k = 0U; k < SAMPLES; k++) {
+            hg_real value[IN], radius[IN], estimate[OUT], wide_as[OUT], r[OUT], J[OUT];
+            for (size_t g = 0U; g < IN; g++) {
+                value[g] = ((draw(&random) % 200U) == 0U) ? INT32_MAX : draw_between(&random, -HG_REAL_MAX, HG_REAL_MAX);
+            }
+            draw_positive(&random, radius, IN, HG_REAL_MAX);
+            assert_status(HG_OK, hg_ring_push(&ring, radius));
+            const hg_status status = hg_residual_step(&generator, value, r);
+            hg_hull_step(&hull, &ring, J);
+            assert_status(status, hg_uio_step(&self, value, &ring, estimate, wide_as));
+            if (status != HG_OK) {
+                refused++;
+                hg_residual_reset(&generator);
+                hg_hull_reset(&hull, HG_START_MOVING);
+            }
+            for (size_t i = 0U; i < OUT; i++) {
+                const bool known = (status == HG_OK) && hg_real_finite(r[i]);
+                unheld += ((status == HG_OK) && !known) ? 1U : 0U;
+                assert_int_equal(known ? r[i] : 0, estimate[i]);
+                assert_int_equal(known ? J[i] : HG_REAL_MAX, wide_as[i]);
+            }
+        }
+    }
+    assert_true((refused > 0U) && (unheld > 0U));
 }
 
 /* ---- a hold ---- */
@@ -569,6 +668,7 @@ int main(void)
         cmocka_unit_test(a_generator_is_its_equations_with_one_rounding_a_sum),
         cmocka_unit_test(a_threshold_is_its_formula_with_one_rounding_a_sum),
         cmocka_unit_test(tables_with_an_exponent_out_of_range_are_refused),
+        cmocka_unit_test(an_observer_is_its_generator_and_its_threshold_or_says_nothing),
         cmocka_unit_test(a_hold_knows_values_and_radii_to_the_step),
         cmocka_unit_test(scales_with_an_exponent_out_of_range_are_refused),
         cmocka_unit_test(codes_at_the_ends_of_the_exponents),

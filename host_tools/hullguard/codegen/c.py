@@ -211,10 +211,15 @@ def _limits(design: Design) -> list[str]:
             lines += [f"#if ({macro} != 0U) && ({macro} != {size}U)", f'#error "model {tables.name} needs {macro} of {size}, or 0"', "#endif"]
         else:
             lines += [f"#if {macro} != 0U", f'#error "model {tables.name} needs {macro} of 0"', "#endif"]
-    if tables.fixed is None:
-        reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
-        lines += ["#if HG_REAL_Q31", *" \\\n       ".join(textwrap.wrap(f'#error "{reason}"', WIDTH - 9, break_long_words=False)).splitlines(), "#endif"]
-    return [*lines, ""]
+    return [*lines, *float_only(tables), ""]
+
+
+def float_only(tables: Tables) -> list[str]:
+    """What stops a compiler that would take tables without a form in fixed point for such."""
+    if tables.fixed is not None:
+        return []
+    reason = tables.not_fixed.replace("\\", "/").replace('"', "'")
+    return ["#if HG_REAL_Q31", *" \\\n       ".join(textwrap.wrap(f'#error "{reason}"', WIDTH - 9, break_long_words=False)).splitlines(), "#endif"]
 
 
 def zonotopes(tables: Tables) -> list[ZonotopeTable]:

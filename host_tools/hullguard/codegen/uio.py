@@ -1,11 +1,14 @@
-"""NAME_uio.h and NAME_uio.c: the tables of a model's unknown-input observers with all estimates (uio.h), and of what isolates their faults (isolate.h)."""
+"""NAME_uio.h and NAME_uio.c: the tables of a model's unknown-input observers with all estimates (uio.h), and of what isolates their faults (isolate.h).
+
+In fixed point estimates and radii are there, isolation is not: it divides data of any ratio."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hullguard.codegen.c import banner, comment, fill, real, reals, table, unsigned
+from hullguard.codegen.both import Both, Scaled
+from hullguard.codegen.c import banner, comment, fill, float_only, real, reals, scaled, table, unsigned
 from hullguard.core.native_uio import UioTable
 from hullguard.design.arith import nearest32
 from hullguard.design.design import Design
@@ -37,12 +40,29 @@ def emit_uio(design: Design) -> tuple[str, str]:
     return _header(design, names, every), _source(design, names, every)
 
 
-def _matrix(name: str, a: Array, about: str) -> list[str]:
-    return table("hg_real", name, f"{a.shape[0]}][{a.shape[1]}", [reals(r) for r in rows(nearest32(a))], about) if a.size else []
+def _both(a: Sequence[float], fixed: Sequence[float] | None) -> Sequence[float]:
+    """Numbers, and beside each what it is in fixed point."""
+    return a if fixed is None else [Both(x, y) for x, y in zip(a, fixed, strict=True)]
 
 
-def _vector(name: str, a: Array, about: str) -> list[str]:
-    return table("hg_real", name, f"{len(a)}", [reals(float(x) for x in nearest32(a))], about) if a.size else []
+def _matrix(name: str, a: Array, about: str, fixed: Array | None = None) -> list[str]:
+    held = [None] * len(a) if fixed is None else rows(fixed)
+    numbers = [reals(_both(r, q)) for r, q in zip(rows(nearest32(a)), held, strict=True)]
+    return table("hg_real", name, f"{a.shape[0]}][{a.shape[1]}", numbers, about) if a.size else []
+
+
+def _vector(name: str, a: Array, about: str, fixed: Array | None = None) -> list[str]:
+    numbers = _both([float(x) for x in nearest32(a)], None if fixed is None else fixed.tolist())
+    return table("hg_real", name, f"{len(a)}", [reals(numbers)], about) if a.size else []
+
+
+def _float(lines: list[str]) -> list[str]:
+    """What fixed point does without."""
+    return ["#if !HG_REAL_Q31", *lines, "#endif"] if lines else []
+
+
+def _fixed(u: UioDesign) -> UioTable | None:
+    return uio_table(u, "q31") if u.fixed is not None else None
 
 
 def _reals(u: UioTable, isolated: Sequence[Isolation]) -> str:
@@ -62,9 +82,11 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
         '#include "hullguard/isolate.h"',
         '#include "hullguard/uio.h"',
         "",
+        *float_only(design.tables),
         f"#define {names.macro}S {len(made)}U /* observers */",
-        f"#define {names.macro}_ISOLATIONS {isolated}U /* estimates of actuators' faults that are told apart from weaker parts */",
+        *_float([f"#define {names.macro}_ISOLATIONS {isolated}U /* estimates of actuators' faults that are told apart from weaker parts */"]),
         f"#define {names.macro}_ESTIMATES {estimates}U /* of all observers, one after another */",
+        *_units(design, names),
         "",
         *comment("Places of the estimates: faults of actuators, of sensors, unknown inputs, states; of each observer in turn."),
         "enum {",
@@ -79,15 +101,15 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
         "};",
         "",
         f"extern const hg_uio_config {names.prefix}_config[{len(made)}];",
-        *([f"extern const hg_isolate_config {names.prefix}_isolate_config[{isolated}];"] if isolated else []),
+        *_float([f"extern const hg_isolate_config {names.prefix}_isolate_config[{isolated}];"] if isolated else []),
         "",
         "/* Memory of all of them. */",
         "typedef struct {",
         f"    hg_uio       uio[{len(made)}];",
-        *([f"    hg_isolate   isolate[{isolated}];", f"    hg_isolation found[{isolated}];"] if isolated else []),
+        *_float([f"    hg_isolate   isolate[{isolated}];", f"    hg_isolation found[{isolated}];"] if isolated else []),
         f"    hg_real      estimate[{estimates}];",
         f"    hg_real      radius[{estimates}];",
-        "    hg_real      real[" + " +\n                      ".join(_reals(u, i) for u, i in zip(made, every, strict=True)) + "];",
+        *_memory(made, every),
         f"}} {names.prefix};",
         "",
         "/** Begin, beside a detector of the same model that has just been started.",
@@ -108,40 +130,64 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
     return "\n".join(lines) + "\n"
 
 
+def _units(design: Design, names: _Names) -> list[str]:
+    """What a program needs that reads estimates in fixed point."""
+    if design.tables.fixed is None:
+        return []
+    units = ", ".join(str(x) for u in design.uios if u.fixed is not None for x in u.fixed.units)
+    about = "Initialiser of the estimates' units: with HG_REAL_Q31 an estimate or radius x is held as the integer x 2^(31 - unit); a radius of HG_REAL_MAX says nothing."
+    return [*comment(about), f"#define {names.macro}_UNITS {{{units}}}"]
+
+
+def _memory(made: Sequence[UioTable], every: Sequence[Sequence[Isolation]]) -> list[str]:
+    """Numbers of all observers and isolations."""
+
+    def summed(isolated: Sequence[Sequence[Isolation]]) -> str:
+        return "    hg_real      real[" + " +\n                      ".join(_reals(u, i) for u, i in zip(made, isolated, strict=True)) + "];"
+
+    alone = summed([[]] * len(made))
+    return ["#if HG_REAL_Q31", alone, "#else", summed(every), "#endif"] if any(every) else [alone]
+
+
 def _observer(u: UioDesign, t: UioTable, n: str, signals: Sequence[str]) -> list[str]:
+    q = _fixed(u)
     lines = [f"/* ---- Observer {n.removeprefix('observer')}: {', '.join(u.names)} ---- */", ""]
     lines += table("uint8_t", f"{n}_signal", f"{len(t.signal)}", [unsigned(t.signal)], "places of the signals it reads: " + ", ".join(signals[i] for i in t.signal))
     for part, about in (("state", "next state from state"), ("input", "next state from signals"), ("output", "estimates from state"), ("direct", "estimates from signals")):
-        lines += _matrix(f"{n}_{part}", getattr(t, part), f"{about}, row-major")
+        lines += _matrix(f"{n}_{part}", getattr(t, part), f"{about}, row-major", q and getattr(q, part))
     lines += table("uint8_t", f"{n}_taps", f"{len(t.taps)}", [unsigned(t.taps)], "lags that are summed one by one, by signal")
     about = "magnitude of the impulse response by two estimates, signal and lag, each with a tail of 0 behind"
     lines += [*comment(f"{n}_weight [{sum(x + 1 for x in t.taps) * t.estimates}]: {about}")]
     lines.append(f"static const hg_real {n}_weight[] = {{")
-    for first, signal, block in t.blocks:
+    held = [None] * len(t.blocks) if q is None else [[x for row in block for x in row] for _, _, block in q.blocks]
+    for (first, signal, block), fixed in zip(t.blocks, held, strict=True):
         lines.append(f"    /* estimates from {u.names[first]} on, {signals[t.wide[signal]]} */")
-        lines += fill([x for row in block for x in reals(row)])
+        lines += fill(reals(_both([x for row in block for x in row], fixed)))
     lines += ["};", ""]
     for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
-        lines += _matrix(f"{n}_{part}", getattr(t, part), f"radii's part from initial state, disturbance, unknown inputs between samples and rounding, by sample {start}")
-    lines += _vector(f"{n}_bias", t.bias, "the same from then on")
+        lines += _matrix(f"{n}_{part}", getattr(t, part), f"radii's part from initial state, disturbance, unknown inputs between samples and rounding, by sample {start}", q and getattr(q, part))
+    lines += _vector(f"{n}_bias", t.bias, "the same from then on", q and q.bias)
     lines += table("hg_real", f"{n}_none", f"{t.estimates}", [reals([0.0] * t.estimates)], "no tail of a residual: each mode has its own")
-    lines += _vector(f"{n}_mode_decay", t.mode_decay, "what a mode has left after a sample")
-    lines += _matrix(f"{n}_mode_input", t.mode_input, "weight of a radius older than the taps in each mode")
-    lines += _matrix(f"{n}_mode_output", t.mode_output, "estimate's radius a unit of each mode")
-    lines += _vector(f"{n}_mode_rest", t.mode_rest, "modes after a start within the initial range")
-    return lines + _vector(f"{n}_mode_moving", t.mode_moving, "modes after a start in a moving plant")
+    lines += _vector(f"{n}_mode_decay", t.mode_decay, "what a mode has left after a sample", q and q.mode_decay)
+    lines += _matrix(f"{n}_mode_input", t.mode_input, "weight of a radius older than the taps in each mode", q and q.mode_input)
+    lines += _matrix(f"{n}_mode_output", t.mode_output, "estimate's radius a unit of each mode", q and q.mode_output)
+    lines += _vector(f"{n}_mode_rest", t.mode_rest, "modes after a start within the initial range", q and q.mode_rest)
+    return lines + _vector(f"{n}_mode_moving", t.mode_moving, "modes after a start in a moving plant", q and q.mode_moving)
 
 
-def _config(t: UioTable, n: str) -> list[str]:
+def _config(u: UioDesign, t: UioTable, n: str) -> list[str]:
+    q = _fixed(u)
+    moved, shown, summed = t.exponents if q is None else (Scaled(0, x) for x in q.exponents)
+    exponent = {"state": moved, "input": moved, "output": shown, "direct": shown}
     order, width, estimates = len(t.state), len(t.signal), t.estimates
     shape = {"state": (order, order), "input": (order, width), "output": (estimates, order), "direct": (estimates, width)}
-    tied = [f"                  .{part} = {{.rows = {r}U, .cols = {c}U, .exponent = 0, .data = {n}_{part}}}" for part, (r, c) in shape.items()]
+    tied = [f"                  .{part} = {{.rows = {r}U, .cols = {c}U, .exponent = {scaled(exponent[part])}, .data = {n}_{part}}}" for part, (r, c) in shape.items()]
     return [
         f"    {{.actuators = {t.actuators}U, .sensors = {t.sensors}U, .unknown = {t.unknown}U, .states = {t.states}U,",
         f"     .observer = {{.order = {order}U, .residuals = {estimates}U, .width = {width}U, .signal = {n}_signal,",
         *(line + "," for line in tied[:-1]),
         tied[-1] + "},",
-        f"     .hull = {{.residuals = {estimates}U, .width = {len(t.wide)}U, .signal = {n}_signal, .taps = {n}_taps, .weight = {n}_weight,",
+        f"     .hull = {{.residuals = {estimates}U, .width = {len(t.wide)}U, .exponent = {scaled(summed)}, .signal = {n}_signal, .taps = {n}_taps, .weight = {n}_weight,",
         f"              .settle = {len(t.rest)}U, .rest = {n}_rest, .rest_left = {n}_none,",
         f"              .moving = {n}_moving, .moving_left = {n}_none, .bias = {n}_bias,",
         f"              .ready_rest = {t.ready_rest}U, .ready_moving = {t.ready_moving}U,",
@@ -177,15 +223,17 @@ def _source(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
     for k, u in enumerate(design.uios):
         t = uio_table(u)
         lines += _observer(u, t, f"observer{k + 1}", signals)
-        configs += _config(t, f"observer{k + 1}")
+        configs += _config(u, t, f"observer{k + 1}")
+    isolating: list[str] = []
     entries: list[str] = []
     for k, (u, isolated) in enumerate(zip(design.uios, every, strict=True)):
         for j, i in enumerate(isolated):
             own, entry = _isolate(i, f"isolate{k + 1}_{j + 1}", len(u.names))
-            lines, entries = lines + own, entries + entry
+            isolating, entries = isolating + own, entries + entry
     lines += [f"const hg_uio_config {names.prefix}_config[{len(design.uios)}] = {{", *configs, "};", ""]
     if entries:
-        lines += [f"const hg_isolate_config {names.prefix}_isolate_config[{sum(len(i) for i in every)}] = {{", *entries, "};", ""]
+        isolating += [f"const hg_isolate_config {names.prefix}_isolate_config[{sum(len(i) for i in every)}] = {{", *entries, "};"]
+        lines += [*_float(isolating), ""]
     return "\n".join(lines + _start(design, names, every) + [""] + _follow(design, names, every)) + "\n"
 
 
@@ -208,35 +256,39 @@ def _start(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) 
             f"        memory = &memory[{_reals(t, [])}];",
             "    }",
         ]
+        begun = []
         for i in isolated:
-            lines += [
+            begun += [
                 "    if (status == HG_OK) {",
                 f"        status = hg_isolate_start(&self->isolate[{count}], &{names.prefix}_isolate_config[{count}], memory);",
                 f"        memory = &memory[HG_ISOLATE_REALS({len(i.table.whole)}U, {i.table.blocks}U)];",
                 "    }",
             ]
             count += 1
+        lines += _float(begun)
     return [*lines, "    (void)memory;", "    return status;", "}"]
 
 
 def _follow(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> list[str]:
     lines = [f"hg_status {names.prefix}_follow({names.prefix} *self, const hg_detector *detector)", "{"]
     if any(every):
-        lines.append("    const bool again = self->uio[0].beginnings != detector->beginnings;")
+        lines += _float(["    const bool again = self->uio[0].beginnings != detector->beginnings;"])
     lines += ["    hg_status status = HG_OK;", "    hg_status own;"]
     if any(every):
-        lines += [f"    for (uint8_t i = 0U; again && (i < {names.macro}_ISOLATIONS); i++) {{", "        hg_isolate_reset(&self->isolate[i]);", "    }"]
+        lines += _float([f"    for (uint8_t i = 0U; again && (i < {names.macro}_ISOLATIONS); i++) {{", "        hg_isolate_reset(&self->isolate[i]);", "    }"])
     place = count = 0
     for k, (u, isolated) in enumerate(zip(design.uios, every, strict=True)):
         lines += [
             f"    own = hg_uio_follow(&self->uio[{k}], detector, &self->estimate[{place}], &self->radius[{place}]);",
             "    status = (own == HG_OK) ? status : own;",
         ]
+        told = []
         for _ in isolated:
-            lines += [
+            told += [
                 f"    own = hg_isolate_step(&self->isolate[{count}], &self->estimate[{place}], &self->radius[{place}], &self->found[{count}]);",
                 "    status = (own == HG_OK) ? status : own;",
             ]
             count += 1
+        lines += _float(told)
         place += len(u.names)
     return [*lines, "    return status;", "}"]

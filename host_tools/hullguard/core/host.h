@@ -198,11 +198,17 @@ int64_t hgh_batch(const hgh_run_config *config, int64_t first, int64_t count, hg
 int64_t hgh_sweep(const hgh_run_config *config, const hgh_fault *fault, int32_t faults, int64_t start, int64_t step, int64_t starts,
                   int64_t horizon, int32_t *delay);
 
-#if !HG_REAL_Q31
+#if HG_REAL_Q31 /* isolation is for the float types: null */
+typedef struct hg_isolate_config hg_isolate_config;
+typedef struct hg_isolation      hg_isolation;
+#endif
+
 /* An unknown-input observer with its own ring of radii, and the isolation of one of its estimates, sample after sample. */
 typedef struct {
     const hg_uio_config     *uio;
     const hg_isolate_config *isolate; /* or null */
+    const int32_t           *unit;          /* [width] of the signals in fixed point (hgh_real()) */
+    const int32_t           *estimate_unit; /* [estimates] */
     int32_t                  width;   /* signals, 1 .. 255 */
     int32_t                  history; /* rows of the ring, more than the hull's taps, .. 255 */
     int32_t                  start;   /* hg_start */
@@ -216,12 +222,13 @@ void     hgh_uio_free(hgh_uio *self);
 
 /** Make up to `samples` steps.
  *  @param[in]  value, radius    [samples][width] signals; radius may be null: 0
- *  @param[out] estimate, bound  [samples][estimates] estimates and their radii; each may be null
+ *  @param[out] estimate, bound  [samples][estimates] estimates and their radii; each may be null; in fixed point HG_REAL_MAX is DBL_MAX
  *  @param[out] isolation        [samples] what isolation says after each, or null
  *  Returns the number of samples that were not refused. */
 int64_t hgh_uio_steps(hgh_uio *self, const double *value, const double *radius, int64_t samples, double *estimate, double *bound,
                       hg_isolation *isolation);
 
+#if !HG_REAL_Q31
 /** [components + 1] offset and shares of the last window that was judged. */
 const hg_real *hgh_uio_share(const hgh_uio *self);
 #endif

@@ -50,6 +50,9 @@ class UioTable:
     mode_output: Array = field(default_factory=lambda: _none(0))  # estimates x modes
     mode_rest: Array = field(default_factory=lambda: _none(0))  # modes
     mode_moving: Array = field(default_factory=lambda: _none(0))  # modes
+    exponents: tuple[int, int, int] = (0, 0, 0)  # of fixed point: of state and input, of output and direct, of weight and modes
+    units: tuple[int, ...] = ()  # of fixed point: numbers are times 2^unit; estimates and radii
+    signal_units: tuple[int, ...] = ()  # the whole signal vector
 
     @property
     def taps(self) -> tuple[int, ...]:
@@ -105,15 +108,24 @@ class UioRun:
 
 
 class Uio:
-    """One observer in this process, with isolation beside it if there is a table for it; goes on where the last run ended."""
+    """One observer in this process, with isolation beside it if there is a table for it; goes on where the last run ended.
+
+    In fixed point a radius of HG_REAL_MAX, of which nothing is known, is the largest double.
+    """
 
     def __init__(self, library: Library, table: UioTable, isolate: IsolateTable | None = None, width: int | None = None, moving: bool = False) -> None:
         self._library, self._table, self._isolate = library, table, isolate
         self._keep: list[Any] = []
         ffi, lib = library.ffi, library.lib
+        if (library.real == "q31") != bool(table.units):
+            raise InputError("the tables of the unknown-input observer are for another number type; take those of uio_table() for this one")
+        if isolate is not None and library.real == "q31":
+            raise InputError("isolation is for the float types: it divides data of any ratio; use float32")
         self._width = max(*table.signal, *table.wide) + 1 if width is None else width
         config = self._new("hgh_uio_config *")
         config.uio, config.width, config.history = self._observer(table), self._width, len(table.weight) + 1
+        config.unit = self._new("int32_t[]", list(table.signal_units) or [0] * self._width)
+        config.estimate_unit = self._new("int32_t[]", list(table.units) or [0] * table.estimates)
         config.isolate = ffi.NULL if isolate is None else self._isolation(isolate, table.estimates)
         config.start = lib.HG_START_MOVING if moving else lib.HG_START_REST
         self._self = ffi.gc(lib.hgh_uio_new(config), lib.hgh_uio_free)
@@ -125,7 +137,8 @@ class Uio:
         return self._keep[-1]
 
     def _reals(self, values: Any) -> Any:
-        return self._new("hg_real[]", np.ravel(np.asarray(values, dtype=float)).tolist() or [0.0])
+        numbers: list[Any] = np.ravel(np.asarray(values, dtype=float)).tolist() or [0.0]
+        return self._new("hg_real[]", [min(round(x * 2**31), 2**31 - 1) for x in numbers] if self._library.real == "q31" else numbers)
 
     def _places(self, values: tuple[int, ...]) -> Any:
         return self._new("uint8_t[]", list(values) or [0])
@@ -136,7 +149,9 @@ class Uio:
         o, h = c.observer, c.hull
         o.order, o.residuals, o.width, o.signal = len(t.state), t.estimates, len(t.signal), self._places(t.signal)
         for place, matrix in ((o.state, t.state), (o.input, t.input), (o.output, t.output), (o.direct, t.direct)):
-            place.rows, place.cols, place.exponent, place.data = *matrix.shape, 0, self._reals(matrix)
+            exponent = t.exponents[0] if matrix is t.state or matrix is t.input else t.exponents[1]
+            place.rows, place.cols, place.exponent, place.data = *matrix.shape, exponent, self._reals(matrix)
+        h.exponent = t.exponents[2]
         h.residuals, h.width, h.signal, h.taps = t.estimates, len(t.wide), self._places(t.wide), self._places(t.taps)
         h.weight, h.settle = self._reals([x for _, _, block in t.blocks for row in block for x in row]), len(t.rest)
         h.rest, h.moving = (self._reals(np.broadcast_to(bias, (len(t.rest), t.estimates))) for bias in (t.rest, t.moving))
@@ -165,11 +180,12 @@ class Uio:
         if signals.shape != (count, self._width) or (wide is not None and wide.shape != signals.shape):
             raise InputError(f"values and radii of shape {signals.shape}: expected samples x {self._width}")
         estimate, bound = np.empty((count, n)), np.empty((count, n))
-        found = ffi.new("hg_isolation[]", max(count, 1))
         given = ffi.NULL if wide is None else ffi.from_buffer("double[]", wide)
         out = [ffi.from_buffer("double[]", made) for made in (estimate, bound)]
+        found = ffi.NULL if self._library.real == "q31" else ffi.new("hg_isolation[]", max(count, 1))
         taken = lib.hgh_uio_steps(self._self, ffi.from_buffer("double[]", signals), given, count, *out, found)
-        record = np.frombuffer(ffi.buffer(found), dtype=_record(self._library.real))[:count]
+        kind = _record(self._library.real)
+        record = np.frombuffer(ffi.buffer(found), dtype=kind)[:count] if found else np.zeros(count, dtype=kind)
         return UioRun(estimate, bound, record["cause"].copy(), record["candidates"].copy(), record["explained"].astype(float), count - int(taken))
 
     @property

@@ -15,7 +15,7 @@ from hullguard.design.arith import digits, mul, row_sums, up32
 from hullguard.design.bank_table import FAULT_SIZE, bank_table
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.checks import Check, generator_checks, refuse
-from hullguard.design.fixed import lower
+from hullguard.design.fixed import Modal, lower
 from hullguard.design.ids import ERRORS, POLYNOMIAL, SURE, undetected_patterns
 from hullguard.design.mismatch import constant_mismatch, disturbed, mismatch_table, uncertain
 from hullguard.design.observer import ObserverMatrices, PostFilter, SubPlant, check_parity, fused, no_filter, post_filter, structure, weighted
@@ -309,17 +309,18 @@ def finish(model: Model, stored: Stored) -> Design:
     checks += [c for i, g in enumerate(generators[: len(model.observers)]) for c in generator_checks(i, g.plant, g.observer, g.filter, g.linear, g.spec.filtered)]
     checks += statistic_checks(model, known) + _model_checks(model, stored, tables, bound, generators)
     refuse(model.path.name, checks)
-    tables, lost = _fixed(model, generators, tables)
+    tables, lost, uios = _fixed(model, generators, tables, uios)
     return Design(model, stored, generators, tables, tuple(checks), bound, derived.usual, derived.states, lost, uios)
 
 
-def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables) -> tuple[Tables, tuple[float, ...]]:
-    """The tables with those for fixed point, or with the reason why there are none; and what rounding costs there, in residual units."""
+def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables, uios: tuple[UioDesign, ...]) -> tuple[Tables, tuple[float, ...], tuple[UioDesign, ...]]:
+    """Tables and observers with those for fixed point, or with the reason why there are none; and what rounding costs there, in residual units."""
+    given, modal = tuple(g.given for g in generators if g.given is not None), tuple(Modal(u.linear, u.given, u.tables) for u in uios)
     try:
-        made = lower(tables, tuple(g.linear for g in generators), tuple(g.given for g in generators if g.given is not None), tuple(g.tables for g in generators), model.path.name)
+        made = lower(tables, tuple(g.linear for g in generators), given, tuple(g.tables for g in generators), model.path.name, modal)
     except InputError as reason:
-        return replace(tables, not_fixed=str(reason)), ()
-    return replace(tables, fixed=made.tables), made.rounding
+        return replace(tables, not_fixed=str(reason)), (), uios
+    return replace(tables, fixed=made.tables), made.rounding, tuple(replace(u, fixed=f) for u, f in zip(uios, made.observers, strict=True))
 
 
 def _unique_ids(model: Model, tables: Tables) -> None:

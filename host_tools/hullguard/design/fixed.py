@@ -17,6 +17,7 @@ import numpy as np
 from hullguard.design.arith import mul, powers
 from hullguard.design.bank_types import BankTable
 from hullguard.design.hull import Fixed, Given, HullTables, Linear, build
+from hullguard.design import uio_hull
 from hullguard.design.tables import FLOAT32, GeneratorTable, GroupTable, MismatchTable, ModalGeneratorTable, SignalTable, Tables, rows
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -37,6 +38,26 @@ class FixedDesign:
 
     tables: Tables
     rounding: tuple[float, ...]  # residuals of generators, banks: the part of J that is rounding, residual units
+    observers: tuple[FixedObserver, ...] = ()  # unknown-input observers, all estimates
+
+
+@dataclass(frozen=True)
+class Modal:
+    """An unknown-input observer of the design, all estimates: its generator in the detector has the first of them."""
+
+    linear: Linear
+    given: uio_hull.ModalGiven
+    tables: uio_hull.ModalTables
+
+
+@dataclass(frozen=True)
+class FixedObserver:
+    """The same for HG_REAL_Q31, numbers in units of 2^unit (k / 2^31 each)."""
+
+    table: ModalGeneratorTable  # all estimates in the place of residuals
+    units: tuple[int, ...]  # of the estimates and their radii
+    signal_units: tuple[int, ...]  # of the whole signal vector
+    rounding: tuple[float, ...]  # estimates: the part of the radius that is rounding, signal units
 
 
 def unit_of(bound: float, what: str) -> int:
@@ -68,8 +89,11 @@ def _exponent(sums: Array, what: str) -> int:
     return exponent
 
 
-def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], hulls: tuple[HullTables, ...], where: str) -> FixedDesign:
-    """A design's tables in fixed point; refuses what has no range that holds for any data, unknown-input observers among them, which have nothing `given`."""
+def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], hulls: tuple[HullTables, ...], where: str, modal: tuple[Modal, ...] = ()) -> FixedDesign:
+    """A design's tables in fixed point; refuses what has no range that holds for any data.
+
+    The last generators are unknown-input observers, `modal`; all others have `linear`, `given` and `hulls`.
+    """
     _refuse(tables, where)
     groups = tuple(_group(g, where) for g in tables.groups)
     sent = [s for g in groups for s in g.signals]
@@ -83,9 +107,14 @@ def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], 
     scale = 2.0 ** units.astype(float)
     residual_units: list[int] = []
     rounding: list[float] = []
-    generators = []
+    generators: list[GeneratorTable] = []
+    observers = []
     for i, g in enumerate(tables.generators):
-        made, unit, lost = _generator(g, linear[i], given[i], hulls[i], _Signals(scale, values, spans), f"{where}: detector.observers[{i}]")
+        if i < len(given):
+            made, unit, lost = _generator(g, linear[i], given[i], hulls[i], _Signals(scale, values, spans), f"{where}: detector.observers[{i}]")
+        else:
+            observers.append(_modal(g, modal[i - len(given)], units, values, f"{where}: detector.uio[{i - len(given)}]"))
+            made, unit, lost = _first(g, observers[-1])
         generators.append(made)
         residual_units += unit
         rounding += lost
@@ -99,7 +128,7 @@ def lower(tables: Tables, linear: tuple[Linear, ...], given: tuple[Given, ...], 
     made_tables = replace(
         tables, groups=groups, generators=tuple(generators), banks=tuple(banks), mismatch=mismatch, units=everything, float_hash=tables.hash, fixed=None, not_fixed=""
     )
-    return FixedDesign(made_tables, tuple(rounding))
+    return FixedDesign(made_tables, tuple(rounding), tuple(observers))
 
 
 @dataclass(frozen=True)
@@ -114,8 +143,6 @@ class _Signals:
 def _refuse(tables: Tables, where: str) -> None:
     if tables.polynomials:
         raise InputError(f"{where}: not for fixed point: the moments of a polynomial filter have no proven range; use float32")
-    if any(isinstance(g, ModalGeneratorTable) for g in tables.generators):
-        raise InputError(f"{where}: not for fixed point: the modes of its thresholds decay too slowly for a proven range; use float32")
     if any(g.zonotope is not None for g in tables.generators):
         raise InputError(f'{where}: not for fixed point: the columns of a zonotope have no proven range; set detector.threshold = "exact"')
     if tables.predictors:
@@ -181,14 +208,8 @@ def _generator(g: GeneratorTable, lin: Linear, given: Given, like: HullTables, s
     tail = (np.array(g.tail) * spans).sum(1) / (1 - np.array(g.decay)) + np.maximum(g.rest_left, g.moving_left)
     z_unit = np.array([unit_of(x * MARGIN, f"{where}: its state") for x in z])
     r_unit = np.array([unit_of(max(a, b) * MARGIN, f"{where}: its residual") for a, b in zip(r, tail, strict=True)])
-    Z, R, V = 2.0**z_unit, 2.0**r_unit, signals.scale[place]
-    state, inputs = lin.state * Z / Z[:, None], lin.input * V / Z[:, None]
-    output, direct = lin.output * Z / R[:, None], lin.direct * V / R[:, None]
-    moved = _exponent(np.abs(state).sum(1) + np.abs(inputs).sum(1), where)
-    shown = _exponent(np.abs(output).sum(1) + np.abs(direct).sum(1), where)
-    state, inputs = near(state / 2.0**moved), near(inputs / 2.0**moved)
-    output, direct = near(output / 2.0**shown), near(direct / 2.0**shown)
-    as_run = Linear(state * 2.0**moved * Z[:, None] / Z, inputs * 2.0**moved * Z[:, None] / V, output * 2.0**shown * R[:, None] / Z, direct * 2.0**shown * R[:, None] / V)
+    Z, R = 2.0**z_unit, 2.0**r_unit
+    held, as_run, (moved, shown) = _matrices(lin, Z, R, signals.scale[place], where)
     _check(as_run, v, Z, R, where)
     t = build(as_run, given, where, Fixed(Z * STEP, R * STEP, like))
     weight, into = t.weight * signals.scale[wide] / R[:, None], t.tail * signals.scale[wide] / R[:, None]
@@ -198,10 +219,10 @@ def _generator(g: GeneratorTable, lin: Linear, given: Given, like: HullTables, s
         raise InputError(f"{where}: not for fixed point: the tail of its threshold has no proven range")
     made = replace(
         g,
-        state=rows(state),
-        input=rows(inputs),
-        output=rows(output),
-        direct=rows(direct),
+        state=rows(held.state),
+        input=rows(held.input),
+        output=rows(held.output),
+        direct=rows(held.direct),
         weight=tuple(rows(w) for w in above(weight / 2.0**summed)),
         rest=rows(above(t.rest[: t.settle] / R)),
         rest_left=_row(above(t.rest_left / R)),
@@ -213,6 +234,88 @@ def _generator(g: GeneratorTable, lin: Linear, given: Given, like: HullTables, s
         exponents=(moved, shown, summed),
     )
     return made, [int(u) for u in r_unit], [float(x) for x in t.rounding]
+
+
+def _matrices(lin: Linear, Z: Array, R: Array, V: Array, where: str) -> tuple[Linear, Linear, tuple[int, int]]:
+    """A generator in units of its states, residuals and signals: as stored, the same in units of the model, and the exponents."""
+    state, inputs = lin.state * Z / Z[:, None], lin.input * V / Z[:, None]
+    output, direct = lin.output * Z / R[:, None], lin.direct * V / R[:, None]
+    moved = _exponent(np.abs(state).sum(1) + np.abs(inputs).sum(1), where)
+    shown = _exponent(np.abs(output).sum(1) + np.abs(direct).sum(1), where)
+    held = Linear(near(state / 2.0**moved), near(inputs / 2.0**moved), near(output / 2.0**shown), near(direct / 2.0**shown))
+    to_state, to_residual = 2.0**moved * Z[:, None], 2.0**shown * R[:, None]
+    return held, Linear(held.state * to_state / Z, held.input * to_state / V, held.output * to_residual / Z, held.direct * to_residual / V), (moved, shown)
+
+
+def _modal(g: GeneratorTable, u: Modal, units: Array, values: Array, where: str) -> FixedObserver:
+    """All estimates of an unknown-input observer. Estimates, radii and thetas are below their units whatever the values and radii in their own units are."""
+    place = list(g.signal)
+    v, V = values[place], 2.0 ** units[place].astype(float)
+    z, r = _ranges(u.linear, v)
+    z_unit = np.array([unit_of(x * MARGIN, f"{where}: its state") for x in z])
+    r_unit = np.array([unit_of(max(a, b) * MARGIN, f"{where}: its estimate") for a, b in zip(r, _widest(u.tables, V), strict=True)])
+    Z, R = 2.0**z_unit, 2.0**r_unit
+    held, as_run, (moved, shown) = _matrices(u.linear, Z, R, V, where)
+    _check(as_run, v, Z, R, where)
+    t = uio_hull.build(as_run, u.given, where, Fixed(Z * STEP, R * STEP, u.tables))
+    if t.mode_decay.shape != u.tables.mode_decay.shape:
+        raise InputError(f"{where}: not for fixed point: rounded tables have other modes than the exact ones; spread the poles")
+    start = np.maximum(t.mode_rest, t.mode_moving)
+    M = 2.0 ** np.array([unit_of((x or 1.0) * MARGIN, f"{where}: a mode of its radii") for x in start + mul(t.mode_input, V[:, None])[:, 0] / (1 - t.mode_decay)])
+    # A theta rounds two products a sample, half a step each.
+    own = mul(t.mode_output, (M * STEP / (1 - t.mode_decay))[:, None])[:, 0] * (1 + 1e-6)
+    weight, into, out = t.weight * V / R[:, None], t.mode_input * V / M[:, None], t.mode_output * M / R[:, None]
+    summed = _exponent(np.concatenate([weight.sum((0, 2)) + out.sum(1), into.sum(1)]), where)
+    made = ModalGeneratorTable(
+        **{
+            **vars(g),
+            "state": rows(held.state),
+            "input": rows(held.input),
+            "output": rows(held.output),
+            "direct": rows(held.direct),
+            "weight": tuple(rows(w) for w in above(weight / 2.0**summed)),
+            "rest": rows(above((t.rest[: t.settle] + own) / R)),
+            "rest_left": _row(t.rest_left),
+            "moving": rows(above((t.moving[: t.settle] + own) / R)),
+            "moving_left": _row(t.moving_left),
+            "bias": _row(above((t.bias + own) / R)),
+            "decay": _row(t.decay),
+            "tail": rows(t.tail),
+            "exponents": (moved, shown, summed),
+            "mode_decay": _row(above(t.mode_decay)),
+            "mode_input": rows(above(into / 2.0**summed)),
+            "mode_output": rows(above(out / 2.0**summed)),
+            "mode_rest": _row(above(t.mode_rest / M)),
+            "mode_moving": _row(above(t.mode_moving / M)),
+        }
+    )
+    _check_radii(made, where)
+    return FixedObserver(made, tuple(int(x) for x in r_unit), tuple(int(x) for x in units), _row(t.rounding + own))
+
+
+def _widest(t: uio_hull.ModalTables, V: Array) -> Array:
+    """The largest radii of estimates, after any radii of signals within +-V. A theta moves on once before it is first read."""
+    theta = np.maximum(t.mode_rest, t.mode_moving) * t.mode_decay + mul(t.mode_input, V[:, None])[:, 0] / (1 - t.mode_decay)
+    bias = np.max(np.vstack([t.rest, t.moving, t.bias]), axis=0)
+    return np.asarray((t.weight * V).sum((0, 2)) + mul(t.mode_output, theta[:, None])[:, 0] + bias)
+
+
+def _check_radii(g: ModalGeneratorTable, where: str) -> None:
+    """The ranges of thetas and radii once more, of the tables as they are stored, with what each step rounds: the units were chosen before."""
+    scale, decay = 2.0 ** g.exponents[2], np.array(g.mode_decay)
+    start, later = np.maximum(g.mode_rest, g.mode_moving), (scale * np.array(g.mode_input).sum(1) + STEP) / (1 - decay)
+    bias = np.max(np.vstack([g.rest, g.moving, g.bias]), axis=0)
+    radius = scale * (np.array(g.weight).sum((0, 2)) + mul(np.array(g.mode_output), (start * decay + later + STEP)[:, None])[:, 0]) + bias + STEP
+    if np.any(start + later >= LARGEST) or np.any(radius >= LARGEST):
+        raise InputError(f"{where}: not for fixed point: rounded tables of its radii leave the range of the exact ones")
+
+
+def _first(g: GeneratorTable, made: FixedObserver) -> tuple[GeneratorTable, list[int], list[float]]:
+    """The generator of a detector: the first estimates alone."""
+    t, count = made.table, len(g.output)
+    of_rows = {name: getattr(t, name)[:count] for name in ("output", "direct", "rest_left", "moving_left", "bias", "decay", "tail", "mode_output")}
+    by_sample = {name: tuple(x[:count] for x in getattr(t, name)) for name in ("weight", "rest", "moving")}
+    return replace(t, **of_rows, **by_sample), list(made.units[:count]), list(made.rounding[:count])
 
 
 def _row(a: Array) -> tuple[float, ...]:

@@ -122,6 +122,7 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     if fixed:
         into_e += fixed.state[:, None] / 2 * DOUBLE
         into_r += fixed.residual[:, None] / 2 * DOUBLE
+        return Rounding(into_e[:, 0], into_r[:, 0], np.zeros((1, F.shape[0], width + more.shape[1])), np.zeros(F.shape[0]))
     # The part that does: |e(k)| <= sum over j of |G^j E| radius(k-1-j), and the value's own radius.
     none = np.zeros((s, more.shape[1]))
     into_z = np.array([np.abs(np.hstack([mul(p, lin.input), mul(p, more)])) for p in P])

@@ -10,6 +10,7 @@ from hullguard.core.native_uio import UioTable
 from hullguard.design import uio, uio_hull
 from hullguard.design.arith import digits, mul, nearest32
 from hullguard.design.checks import Check
+from hullguard.design.fixed import FixedObserver
 from hullguard.design.hull import Linear, Ranges, rounded
 from hullguard.design.observer import ObserverMatrices, SubPlant
 from hullguard.design.uio_discrete import Discrete, Estimator, between_samples, discretised, estimator, left_inverse, measured, sampled, zero_order_hold
@@ -35,9 +36,11 @@ class UioDesign:
     sub: SubPlant
     linear: Linear
     follows: Array
+    given: uio_hull.ModalGiven
     tables: uio_hull.ModalTables
     signal: tuple[int, ...]
     smallest: Array  # faults of the spec: steps that leave the radius of their own estimate
+    fixed: FixedObserver | None = None  # the same in fixed point, if there is a form
 
     @property
     def rows(self) -> Linear:
@@ -211,9 +214,10 @@ def finish(model: Model, i: int, found: StoredUio, radius: Array, values: Array,
     into = mul(found.follows, sub.Ed) - mul(linear.input[:, :m], sub.Fd)
     passing = uio_hull.Passing(found.passing, into, mul(linear.direct[:, :m], sub.Fd))
     longest = max(g.trigger.interval_max for g in model.groups)
-    tables = uio_hull.build(linear, found.follows, truth, sub, ranges, passing, radius[list(signal)], longest, where_of(model, i))
+    given = uio_hull.ModalGiven(found.follows, truth, sub, ranges, passing, radius[list(signal)], longest)
+    tables = uio_hull.build(linear, given, where_of(model, i))
     names = tuple(model.faults[f].name for f in (*spec.actuators, *spec.sensors)) + known.names + plant.states
-    made = UioDesign(spec, names, sub, linear, found.follows, tables, signal, np.zeros(0))
+    made = UioDesign(spec, names, sub, linear, found.follows, given, tables, signal, np.zeros(0))
     return replace(made, smallest=np.diag(smallest_steps(model, made, made.faults)) if made.faults else np.zeros(0))
 
 
@@ -260,8 +264,19 @@ def observer_spec(model: Model, made: UioDesign) -> Observer:
     return Observer(order, order, len(made.faults), made.spec.outputs, tuple(range(len(model.inputs))), made.faults, False, search, None, None)
 
 
-def uio_table(made: UioDesign) -> UioTable:
-    """hg_uio_config."""
+def uio_table(made: UioDesign, real: str = "f32") -> UioTable:
+    """hg_uio_config for a number type."""
+    table = _float_table(made)
+    if real != "q31":
+        return table
+    if made.fixed is None:
+        raise InputError(f"the observer of {', '.join(made.names)} has no form in fixed point; use float32")
+    parts = ("state", "input", "output", "direct", "weight", "rest", "moving", "mode_decay", "mode_input", "mode_output", "mode_rest", "mode_moving")
+    arrays = {part: np.array(getattr(made.fixed.table, part)) for part in parts}
+    return replace(table, **arrays, exponents=made.fixed.table.exponents, units=made.fixed.units, signal_units=made.fixed.signal_units)
+
+
+def _float_table(made: UioDesign) -> UioTable:
     t = made.tables
     return UioTable(
         actuators=len(made.spec.actuators),

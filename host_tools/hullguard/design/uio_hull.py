@@ -10,13 +10,14 @@ behind the taps have a theta for each mode, and so has the initial state: slow m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hullguard.design.arith import U32, digits, mul, powers, row_sums, up32
-from hullguard.design.hull import READY_SHARE, TAIL_SHARE, HullTables, Linear, Ranges, rounding_of
+from hullguard.design.hull import DOUBLE, READY_SHARE, TAIL_SHARE, Fixed, HullTables, Linear, Ranges, rounding_of
 from hullguard.design.observer import SubPlant
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -58,6 +59,19 @@ class Passing:
     at_once: Array  # rows x nd: what the same disturbances do to an estimate at once, the noise of the sensors
 
 
+@dataclass(frozen=True)
+class ModalGiven:
+    """What the tables of one observer follow from, besides its matrices."""
+
+    T: Array  # order x n
+    truth: Array  # rows x n: what the rows stand for
+    plant: SubPlant
+    ranges: Ranges
+    passing: Passing
+    radius: Array  # width: what the radii usually are
+    least: int  # fewest taps
+
+
 def _vectors(G: Array) -> tuple[Complex, Complex]:
     """Poles and eigenvectors, in an order and a basis that do not depend on the processor.
 
@@ -97,14 +111,15 @@ def _times(F: Array, M: Array) -> Array:
     return out
 
 
-def build(lin: Linear, T: Array, truth: Array, plant: SubPlant, ranges: Ranges, passing: Passing, radius: Array, least: int, where: str) -> ModalTables:
-    """All tables. `radius` (width): what the radii usually are; `least`: fewest taps."""
+def build(lin: Linear, given: ModalGiven, where: str, fixed: Fixed | None = None) -> ModalTables:
+    """All tables, rounded up to float32; for fixed point not yet rounded, and without what the steps of the thetas lose."""
+    T, plant, ranges, passing, radius = given.T, given.plant, given.ranges, given.passing, given.radius
     decay, inverse, out = _modes(lin, where)
     slowest = float(decay.max())
     length = int(np.ceil(np.log(GONE) / np.log(max(slowest, 0.05)))) + 2
     F = powers(lin.output, lin.state, length)
     lags = max(64, int(np.ceil(np.log(FORGOTTEN) / np.log(max(slowest, 0.05)))))
-    loss = rounding_of(lin, T, plant, ranges, np.hstack([np.diag(passing.box), passing.columns]), np.zeros((len(lin.state), 0)), min(lags, length), truth=truth)
+    loss = rounding_of(lin, T, plant, ranges, np.hstack([np.diag(passing.box), passing.columns]), np.zeros((len(lin.state), 0)), min(lags, length), fixed, given.truth)
     weights = np.concatenate([np.abs(lin.direct)[None], np.abs(_times(F, lin.input))])
     count = loss.weight.shape[0]
     weights[:count] += loss.weight
@@ -115,46 +130,48 @@ def build(lin: Linear, T: Array, truth: Array, plant: SubPlant, ranges: Ranges, 
 
     mode_input = np.abs(mul(inverse.real, lin.input) + 1j * mul(inverse.imag, lin.input)) * WIDER
     rounded_lags = mul(loss.weight.reshape(-1, len(ranges.value)), (2 * ranges.value)[:, None]).reshape(loss.weight.shape[:2])
-    taps = _taps(weights, np.abs(out) * WIDER, decay, mode_input, radius, rounded_lags, least)
+    taps = fixed.like.taps[0] if fixed else _taps(weights, np.abs(out) * WIDER, decay, mode_input, radius, rounded_lags, given.least)
     late = rounded_lags[taps:].sum(0)
     # Of it, what is no rounding: a hold that takes y for straight between samples.
     m = plant.C.shape[0]
     off = [mul(T, plant.A) - mul(lin.state, T) - mul(lin.input[:, :m], plant.C), mul(T, plant.B) - mul(lin.input[:, :m], plant.D) - lin.input[:, m:]]
     into = mul(np.abs(off[0]), ranges.state[:, None]) + mul(np.abs(off[1]), ranges.input[:, None])
     held = _times(np.abs(F), into)[:, :, 0].sum(0)
-    bias = per_step.sum(0) + behind + row_sums(np.abs(passing.at_once)) + loss.into_r + loss.behind + late
-    mode_decay = up32(digits(decay * WIDER + 1e-9, 7))
+    own = fixed.residual if fixed else 0.0  # a threshold rounds its sum
+    bias = per_step.sum(0) + behind + row_sums(np.abs(passing.at_once)) + loss.into_r + loss.behind + late + own
+    up: Callable[[Array], Array] = np.asarray if fixed else up32
+    mode_decay = up(digits(decay * WIDER + 1e-9, 7))
     mode_output = np.abs(out) * WIDER * mode_decay ** (taps - 1)
     tail = mode_output @ (mode_input @ radius / (1 - mode_decay))
     steady = bias + (weights[:taps] * radius).sum((0, 2)) + tail
     starts = {name: np.abs(inverse @ T) @ x * WIDER for name, x in (("rest", ranges.initial), ("moving", ranges.state))}
     fast = mode_decay**taps < FAST
-    settle = 1 + next((k for k in range(SETTLE_MAX) if np.all(mode_decay[fast] ** k < GONE)), SETTLE_MAX)
-    widen = 1 + (taps * weights.shape[2] + len(decay) + 16) * U32 * 1.01
+    settle = fixed.like.settle if fixed else 1 + next((k for k in range(SETTLE_MAX) if np.all(mode_decay[fast] ** k < GONE)), SETTLE_MAX)
+    widen = DOUBLE if fixed else 1 + (taps * weights.shape[2] + len(decay) + 16) * U32 * 1.01
     course = mode_decay[:, None] ** np.arange(settle)
     rows = {name: bias + ((np.abs(out) * WIDER * np.where(fast, x, 0.0)) @ course).T for name, x in starts.items()}
     # theta moves on once before it is first used, and its output counts it as taps - 1 samples older.
     before = {name: np.where(fast, 0.0, x / np.where(fast, 1.0, mode_decay) ** taps) for name, x in starts.items()}
     none = np.zeros(weights.shape[1])
     return ModalTables(
-        weight=up32(weights[:taps] * widen),
+        weight=up(weights[:taps] * widen),
         taps=(taps,) * weights.shape[2],
-        rest=up32(rows["rest"] * widen),
-        moving=up32(rows["moving"] * widen),
+        rest=up(rows["rest"] * widen),
+        moving=up(rows["moving"] * widen),
         settle=settle,
         rest_left=none,
         moving_left=none,
-        bias=up32(np.maximum(rows["rest"][-1], rows["moving"][-1]) * widen),
+        bias=up(np.maximum(rows["rest"][-1], rows["moving"][-1]) * widen),
         ready_rest=_ready(np.abs(out), mode_decay, starts["rest"], steady),
         ready_moving=_ready(np.abs(out), mode_decay, starts["moving"], steady),
         decay=none,
         tail=np.zeros(weights.shape[1:]),
         mode_decay=mode_decay,
-        mode_input=up32(digits(mode_input, 7) * widen),
-        mode_output=up32(digits(mode_output, 7) * widen),
-        mode_rest=up32(digits(before["rest"], 7) * widen),
-        mode_moving=up32(digits(before["moving"], 7) * widen),
-        rounding=step.sum(0) + loss.into_r + loss.behind + late - held,
+        mode_input=up(digits(mode_input, 7) * widen),
+        mode_output=up(digits(mode_output, 7) * widen),
+        mode_rest=up(digits(before["rest"], 7) * widen),
+        mode_moving=up(digits(before["moving"], 7) * widen),
+        rounding=step.sum(0) + loss.into_r + loss.behind + late - held + own,
         steady_bias=bias,
         steady=steady,
     )
