@@ -15,7 +15,8 @@
  *      theta_m(k) = |lam_m| theta_m(k-1) + sum_g |S^-1 L|_mg radius_g(k - taps_g)      added to J_i: sum_m |M S|_im |lam_m|^(taps-1) theta_m
  *
  *  (a complex pair is one mode, its output counted twice; taps of all signals are the same then), with tails of 0. A slow mode's theta may also begin with what the initial state puts
- *  into it, in place of thousands of bias rows. The bound of a step's rounding belongs into decay and input.
+ *  into it, in place of thousands of bias rows. The bound of a step's rounding belongs into decay and input; in fixed point, where a theta has a
+ *  unit of its own and loses at most one of its steps a sample, into bias: sum_m |M S|_im |lam_m|^(taps-1) step_m / (1 - |lam_m|).
  *  One ring of past radii serves all hulls of a detector; rewriting the past there is all that a late-discovered loss needs,
  *  because J is linear in the radii. Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_HULL_H

@@ -23,7 +23,8 @@
  *
  *  The regression is a triangular factor updated by rotations without square roots (Gentleman 1973): its first column, of ones, centres all others,
  *  and no number is ever squared and subtracted, so that float32 is enough. A block begins with an empty factor: memory is bounded, what is older than
- *  the window is forgotten to the last bit, and rounding does not gather. For floating-point hg_real only.
+ *  the window is forgotten to the last bit, and rounding does not gather. For floating-point hg_real only: the ratios of a factor's entries, which it
+ *  divides, have no bound that holds for any data. An image in fixed point has the estimates and their radii, and no isolation.
  *  Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_ISOLATE_H
 #define HULLGUARD_ISOLATE_H

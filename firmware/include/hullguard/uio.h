@@ -29,6 +29,7 @@
  *    f((k-1)Ts + s) ds is the mean over the sample interval: f(k-1) itself where f is constant in between.
  *  It holds while the signals are within their radii and disturbance, noise, and f between samples (y is not quite linear then) are within the
  *  bounds that the bias tables were made for. Event triggering, a lost or late frame, and a missing sensor are larger radii and nothing else;
+ *  a radius of HG_REAL_MAX says that nothing is known;
  *  a loss that shows late is corrected where the detector rewrites its ring of radii (the hull has as many taps as any group's interval_max).
  *  Without a fault an entry's truth is 0: |fhat_i| > radius_i proves one. An alarm is raised by the detector, not here: give it a generator whose
  *  residuals are those rows of fhat that stand for faults (they come first, so that it can name the same four tables with fewer rows).
@@ -38,7 +39,8 @@
  *      (void)hg_uio_follow(&uio, &node.detector, estimate, radius);
  *
  *  which begins again where the detector did: its ring holds nothing older then. What an estimate has to do with actuators, components and sensors is
- *  isolate.h's business. Not reentrant per instance; safe in interrupt context; no allocation. */
+ *  isolate.h's business, for floating-point hg_real only. In fixed point each estimate, its radius with it, has a unit of its own, so chosen that
+ *  neither reaches it whatever codes the signals have and however wide their radii are. Not reentrant per instance; safe in interrupt context; no allocation. */
 #ifndef HULLGUARD_UIO_H
 #define HULLGUARD_UIO_H
 

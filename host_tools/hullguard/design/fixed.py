@@ -248,7 +248,7 @@ def _matrices(lin: Linear, Z: Array, R: Array, V: Array, where: str) -> tuple[Li
 
 
 def _modal(g: GeneratorTable, u: Modal, units: Array, values: Array, where: str) -> FixedObserver:
-    """All estimates of an unknown-input observer. Estimates, radii and thetas are below their units whatever the values and radii in their own units are."""
+    """All estimates of an unknown-input observer. None reaches its unit, nor a radius or theta, whatever the codes, and the radii below their units, are."""
     place = list(g.signal)
     v, V = values[place], 2.0 ** units[place].astype(float)
     z, r = _ranges(u.linear, v)
