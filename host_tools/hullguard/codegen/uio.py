@@ -1,11 +1,14 @@
 """NAME_uio.h and NAME_uio.c: the tables of a model's unknown-input observers with all estimates (uio.h), and of what isolates their faults (isolate.h).
 
-In fixed point estimates and radii are there, isolation is not: it divides data of any ratio."""
+In fixed point estimates and radii are there, isolation is not: it divides data of any ratio.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from hullguard.codegen.both import Both, Scaled
 from hullguard.codegen.c import banner, comment, fill, float_only, real, reals, scaled, table, unsigned
@@ -59,6 +62,11 @@ def _vector(name: str, a: Array, about: str, fixed: Array | None = None) -> list
 def _float(lines: list[str]) -> list[str]:
     """What fixed point does without."""
     return ["#if !HG_REAL_Q31", *lines, "#endif"] if lines else []
+
+
+def _held(fixed: UioTable | None, part: str) -> Array | None:
+    """An array of the table in fixed point, if there is one."""
+    return None if fixed is None else np.asarray(getattr(fixed, part))
 
 
 def _fixed(u: UioDesign) -> UioTable | None:
@@ -154,7 +162,7 @@ def _observer(u: UioDesign, t: UioTable, n: str, signals: Sequence[str]) -> list
     lines = [f"/* ---- Observer {n.removeprefix('observer')}: {', '.join(u.names)} ---- */", ""]
     lines += table("uint8_t", f"{n}_signal", f"{len(t.signal)}", [unsigned(t.signal)], "places of the signals it reads: " + ", ".join(signals[i] for i in t.signal))
     for part, about in (("state", "next state from state"), ("input", "next state from signals"), ("output", "estimates from state"), ("direct", "estimates from signals")):
-        lines += _matrix(f"{n}_{part}", getattr(t, part), f"{about}, row-major", q and getattr(q, part))
+        lines += _matrix(f"{n}_{part}", getattr(t, part), f"{about}, row-major", _held(q, part))
     lines += table("uint8_t", f"{n}_taps", f"{len(t.taps)}", [unsigned(t.taps)], "lags that are summed one by one, by signal")
     about = "magnitude of the impulse response by two estimates, signal and lag, each with a tail of 0 behind"
     lines += [*comment(f"{n}_weight [{sum(x + 1 for x in t.taps) * t.estimates}]: {about}")]
@@ -165,14 +173,15 @@ def _observer(u: UioDesign, t: UioTable, n: str, signals: Sequence[str]) -> list
         lines += fill(reals(_both([x for row in block for x in row], fixed)))
     lines += ["};", ""]
     for part, start in (("rest", "after a start within the initial range"), ("moving", "after a start in a moving plant")):
-        lines += _matrix(f"{n}_{part}", getattr(t, part), f"radii's part from initial state, disturbance, unknown inputs between samples and rounding, by sample {start}", q and getattr(q, part))
-    lines += _vector(f"{n}_bias", t.bias, "the same from then on", q and q.bias)
+        about = f"radii's part from initial state, disturbance, unknown inputs between samples and rounding, by sample {start}"
+        lines += _matrix(f"{n}_{part}", getattr(t, part), about, _held(q, part))
+    lines += _vector(f"{n}_bias", t.bias, "the same from then on", _held(q, "bias"))
     lines += table("hg_real", f"{n}_none", f"{t.estimates}", [reals([0.0] * t.estimates)], "no tail of a residual: each mode has its own")
-    lines += _vector(f"{n}_mode_decay", t.mode_decay, "what a mode has left after a sample", q and q.mode_decay)
-    lines += _matrix(f"{n}_mode_input", t.mode_input, "weight of a radius older than the taps in each mode", q and q.mode_input)
-    lines += _matrix(f"{n}_mode_output", t.mode_output, "estimate's radius a unit of each mode", q and q.mode_output)
-    lines += _vector(f"{n}_mode_rest", t.mode_rest, "modes after a start within the initial range", q and q.mode_rest)
-    return lines + _vector(f"{n}_mode_moving", t.mode_moving, "modes after a start in a moving plant", q and q.mode_moving)
+    lines += _vector(f"{n}_mode_decay", t.mode_decay, "what a mode has left after a sample", _held(q, "mode_decay"))
+    lines += _matrix(f"{n}_mode_input", t.mode_input, "weight of a radius older than the taps in each mode", _held(q, "mode_input"))
+    lines += _matrix(f"{n}_mode_output", t.mode_output, "estimate's radius a unit of each mode", _held(q, "mode_output"))
+    lines += _vector(f"{n}_mode_rest", t.mode_rest, "modes after a start within the initial range", _held(q, "mode_rest"))
+    return lines + _vector(f"{n}_mode_moving", t.mode_moving, "modes after a start in a moving plant", _held(q, "mode_moving"))
 
 
 def _config(u: UioDesign, t: UioTable, n: str) -> list[str]:

@@ -11,13 +11,14 @@ What rounding does to tables and results is bounded as in float32 and added to t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from hullguard.design import uio_hull
 from hullguard.design.arith import mul, powers
 from hullguard.design.bank_types import BankTable
 from hullguard.design.hull import Fixed, Given, HullTables, Linear, build
-from hullguard.design import uio_hull
 from hullguard.design.tables import FLOAT32, GeneratorTable, GroupTable, MismatchTable, ModalGeneratorTable, SignalTable, Tables, rows
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -313,8 +314,8 @@ def _check_radii(g: ModalGeneratorTable, where: str) -> None:
 def _first(g: GeneratorTable, made: FixedObserver) -> tuple[GeneratorTable, list[int], list[float]]:
     """The generator of a detector: the first estimates alone."""
     t, count = made.table, len(g.output)
-    of_rows = {name: getattr(t, name)[:count] for name in ("output", "direct", "rest_left", "moving_left", "bias", "decay", "tail", "mode_output")}
-    by_sample = {name: tuple(x[:count] for x in getattr(t, name)) for name in ("weight", "rest", "moving")}
+    of_rows: dict[str, Any] = {name: getattr(t, name)[:count] for name in ("output", "direct", "rest_left", "moving_left", "bias", "decay", "tail", "mode_output")}
+    by_sample: dict[str, Any] = {name: tuple(x[:count] for x in getattr(t, name)) for name in ("weight", "rest", "moving")}
     return replace(t, **of_rows, **by_sample), list(made.units[:count]), list(made.rounding[:count])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -272,7 +273,7 @@ def uio_table(made: UioDesign, real: str = "f32") -> UioTable:
     if made.fixed is None:
         raise InputError(f"the observer of {', '.join(made.names)} has no form in fixed point; use float32")
     parts = ("state", "input", "output", "direct", "weight", "rest", "moving", "mode_decay", "mode_input", "mode_output", "mode_rest", "mode_moving")
-    arrays = {part: np.array(getattr(made.fixed.table, part)) for part in parts}
+    arrays: dict[str, Any] = {part: np.array(getattr(made.fixed.table, part)) for part in parts}
     return replace(table, **arrays, exponents=made.fixed.table.exponents, units=made.fixed.units, signal_units=made.fixed.signal_units)
 
 
