@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from hullguard import __version__
+from hullguard.bus.lean import import_can
 from hullguard.errors import HullguardError
 
 STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C (0 where that ends it: detect, monitor, inject)
@@ -273,6 +274,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; its exit status. Errors are one line on stderr that names the cause and the cure."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        import_can()
         args = build_parser().parse_args(given)  # what it imports takes long enough for a Ctrl-C
         args.arguments = given
         return (_of_kind(args) or _commands()[args.command])(args)

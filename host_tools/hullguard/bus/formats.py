@@ -13,7 +13,7 @@ from pathlib import Path
 
 import can
 
-from hullguard.bus import candump, mf4, pcap
+from hullguard.bus import candump, lean, mf4, pcap
 from hullguard.bus.candump import ERROR, REMOTE, Entry
 from hullguard.bus.link import from_message, to_message
 from hullguard.errors import InputError
@@ -105,7 +105,7 @@ def _write_asc(path: Path, entries: Sequence[Entry]) -> None:
 
 def _read_mf4(path: Path) -> Iterator[Entry]:
     mf4.package()
-    with can.MF4Reader(path) as reader:
+    with lean.mf4().MF4Reader(path) as reader:
         yield from map(from_numbered, reader)
 
 
