@@ -76,7 +76,7 @@ def unit_of(name: str) -> str:
 LIBRARY = frozenset(
     {
         *("bank", "can", "code", "config", "consistency", "decision", "detector", "e2e", "frame", "fusion", "hold", "hull", "hullguard", "isolate", "linalg"),
-        *("mismatch", "node", "polynomial", "predict", "real", "residual", "ring", "status", "tracker", "trigger", "uio", "variance", "zonotope"),
+        *("mismatch", "node", "polynomial", "predict", "real", "residual", "ring", "statistic", "status", "tracker", "trigger", "uio", "variance", "zonotope"),
     }
 )
 

@@ -47,8 +47,8 @@ def costs(design: Design) -> list[Cost]:
 
 
 def _shared(t: Tables) -> Cost:
-    """Signal vectors, rings of radii and values, residuals and thresholds."""
-    return Cost("shared: vectors, histories", 0, 0, 2 * t.width + 2 * t.residuals + t.width * t.history + t.signals * t.window)
+    """Signal vectors, promises of the holds, rings of radii and values, residuals and thresholds."""
+    return Cost("shared: vectors, histories", 0, 0, 2 * t.width + 2 * t.residuals + 2 * t.signals + t.width * t.history + t.signals * t.window)
 
 
 def _generator(name: str, g: GeneratorTable) -> Cost:
