@@ -1,12 +1,13 @@
 #include "tracker_models.h"
 
 #include "fusion5.h"
+#include "fusion5_fast.h"
 #include "tracking.h"
 
 #include <string.h>
 
 /* One line a model: its name as its generated header writes it, in lower and in upper case. */
-#define MODELS(X) X(fusion5, FUSION5) X(tracking, TRACKING)
+#define MODELS(X) X(fusion5, FUSION5) X(fusion5_fast, FUSION5_FAST) X(tracking, TRACKING)
 
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_tracker name##_storage;                                  \

@@ -285,6 +285,14 @@ static bool dead(const hg_tracker *self, uint8_t i)
     return self->fusion.sensor[i].age > self->config->fusion->watchdog;
 }
 
+/* By how many samples a sensor's heartbeat is overdue, 0: it is not. What may be late as a matter of course is not overdue before that. */
+static uint32_t overdue_by(const hg_tracker *self, uint8_t i)
+{
+    const uint32_t age = self->fusion.sensor[i].age;
+    const uint32_t limit = (uint32_t)self->config->fusion->heartbeat + self->config->fusion->delay;
+    return (age > limit) ? (age - limit) : 0U;
+}
+
 static hg_bus_health health_of(const hg_tracker *self, uint8_t i)
 {
     hg_bus_health health = HG_BUS_GOOD;
@@ -292,7 +300,7 @@ static hg_bus_health health_of(const hg_tracker *self, uint8_t i)
         health = HG_BUS_ABSENT;
     } else if (dead(self, i)) {
         health = HG_BUS_STALE;
-    } else if (((self->lossy & mark(i)) != 0U) || (self->fusion.sensor[i].age > self->config->fusion->heartbeat)) {
+    } else if (((self->lossy & mark(i)) != 0U) || (overdue_by(self, i) > 0U)) {
         health = HG_BUS_LOSSY;
     } else {
         /* good */
@@ -305,8 +313,8 @@ static void watch_deadlines(hg_tracker *self)
 {
     const uint8_t interval = self->config->fusion->heartbeat;
     for (uint8_t i = 0U; i < self->config->fusion->sensors; i++) {
-        const uint8_t age = self->fusion.sensor[i].age;
-        if ((age > interval) && (age < UINT8_MAX) && (((age - 1U) % interval) == 0U)) {
+        const uint32_t by = overdue_by(self, i);
+        if ((by > 0U) && (self->fusion.sensor[i].age < UINT8_MAX) && (((by - 1U) % interval) == 0U)) {
             (void)hg_e2e_machine_step(&self->link[i].machine, self->config->source[i].message->e2e->limits, HG_E_EMPTY);
         }
     }

@@ -14,6 +14,7 @@ from node_support import HERE, NODE, SEED, command, hullguard, in_guest
 
 CASES = {
     "fusion5": ["fusion5", "--scenario", "lossy", "--samples", "150", "--fault", "y1_m:bias:0.6@90"],
+    "delayed": ["fusion5_fast", "--scenario", "delayed", "--samples", "150", "--fault", "y1_m:bias:0.6@90"],
     "tracking": ["tracking", "--samples", "130", "--fault", "wheel2_mps:freeze@90"],
     "double": ["fusion5", "--samples", "40", "--no-fault", "--real", "f64"],
     "changed": ["fusion5", "--samples", "40", "--no-fault", "--set", "trigger.heartbeat=12"],
@@ -70,7 +71,7 @@ def test_in_real_time_the_nodes_timer_closes_nothing_early(runs: dict[tuple[str,
 
 def test_the_node_lists_and_refuses(tmp_path: Path) -> None:
     for binary in NODE.values():
-        assert {"fusion5", "tracking"} <= {line.split()[0] for line in command([str(binary), "--list"]).stdout.splitlines()}
+        assert {"fusion5", "fusion5_fast", "tracking"} <= {line.split()[0] for line in command([str(binary), "--list"]).stdout.splitlines()}
         done = command([str(binary), "--model", "fusion6"])
         assert done.returncode == 2 and "tracking" in done.stderr and done.stderr.count("\n") == 1
     refused = command(hullguard("run", "fusion5", "--bus", "vcan7", "--samples", "9", "--no-fault", "--json", "--out", tmp_path))

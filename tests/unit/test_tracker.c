@@ -528,6 +528,38 @@ static void test_a_dead_sensor_is_suspected_and_comes_back(void **state)
     assert_true(r.verdict.plant == HG_PLANT_NONE);
 }
 
+/* The frame of sample k of the second sensor comes after the tick of that sample; the others' in time. */
+static void delayed(rig *r, uint32_t k, uint16_t sends)
+{
+    if (k > 0U) {
+        const uint32_t before = k - 1U;
+        assert_status(HG_OK, value(r, 1U, (uint8_t)(before & 15U), before, 0.01 * (double)(before % 5U)));
+    }
+    sample(r, k, sends, 0.0);
+}
+
+static void test_a_frame_within_the_delay_is_not_overdue(void **state)
+{
+    static rig r;
+    hg_tracker_config config = usual;
+    (void)state;
+    config.fusion = &late_filter;
+    begin(&r, &config, HG_START_REST);
+    for (uint32_t k = 0U; k < 20U; k++) {
+        delayed(&r, k, 5U);
+    }
+    assert_count(20U - 1U, hg_tracker_health(&r.self, 1U)->good);
+    assert_count(0U, hg_tracker_health(&r.self, 1U)->late); /* as a matter of course */
+    for (uint32_t k = 20U; k <= (18U + HEARTBEAT); k++) {
+        sample(&r, k, 5U, 0.0); /* in the last one it had to speak, and the frame may be on its way */
+    }
+    assert_count((uint32_t)HG_BUS_GOOD, ((uint32_t)r.verdict.bus >> 2U) & 3U);
+    assert_count(1U, (uint32_t)r.link[1].machine.ok & 1U);
+    sample(&r, 18U + HEARTBEAT + 1U, 5U, 0.0);
+    assert_count((uint32_t)HG_BUS_LOSSY, ((uint32_t)r.verdict.bus >> 2U) & 3U);
+    assert_count(0U, (uint32_t)r.link[1].machine.ok & 1U);
+}
+
 static void test_nobody_heard_is_the_bus(void **state)
 {
     static rig r;
@@ -750,6 +782,7 @@ int main(void)
         cmocka_unit_test(test_a_late_tick_is_refused_and_two_are_believed),
         cmocka_unit_test(test_an_outage_begins_again),
         cmocka_unit_test(test_a_dead_sensor_is_suspected_and_comes_back),
+        cmocka_unit_test(test_a_frame_within_the_delay_is_not_overdue),
         cmocka_unit_test(test_nobody_heard_is_the_bus),
         cmocka_unit_test(test_a_biased_sensor_is_taken_out),
         cmocka_unit_test(test_without_a_consistency_test),

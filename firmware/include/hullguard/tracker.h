@@ -15,7 +15,8 @@
  *  Values on the wire are absolute; the filter takes them relative to its local origin. One that wraps round has the codes minimum .. maximum of its scale for
  *  all multiples of their range, and means the one nearest to the prediction.
  *
- *  A frame is booked to the sample of its stamp: to the open one, and up to `depth` samples back. Its counter may have moved by a frame a sample, no
+ *  A frame is booked to the sample of its stamp: to the open one, and up to `depth` samples back. One that is up to `delay` late is as good as one in time, is due
+ *  that much later, and leaves all copies equal. Its counter may have moved by a frame a sample, no
  *  further. A tick up to 7 samples ahead closes those between without their frames; a late one is refused, and two late ones in sequence are of a time that this node
  *  has lost: the filter begins again there. The sample index is known from the first tick on.
  *

@@ -333,7 +333,7 @@ def _shares(model: FusionModel, found: Found, place: int, loss: float) -> float:
 
 def _trigger(model: FusionModel, found: Found) -> TriggerTable:
     m = len(model.sensors)
-    late = 0.5 if model.trigger.delay else 0.0
+    late = model.trigger.late
     level = [MUTE**2] * m
     for place, i in enumerate(found.sensors):
         level[i] = found.delta[place] ** 2

@@ -87,8 +87,9 @@ class FusionTrigger:
     silence: bool  # False: silence says nothing, as published
     heartbeat: int
     watchdog: int
-    delay: int
-    depth: int
+    delay: int  # samples that a frame may be late as a matter of course
+    depth: int  # samples that can be filtered again
+    late: float  # probability that a frame has not come when its sample is closed; 0 without delay
     huber: float
     loss: float
     smoothing: float
@@ -115,7 +116,7 @@ class FusionScenario:
     samples: int
     drive: str
     loss: float
-    late: float
+    late: float  # probability that a sensor's frame comes after the tick of its sample, in the next one
     jump_at: int  # sample in which the state jumps; -1: never
     jump: tuple[float, ...]
     faults: tuple[FaultSpec, ...]
@@ -296,6 +297,9 @@ def _read_trigger(t: Table, n: int, m: int) -> FusionTrigger:
         raise t.error("level", "a schedule follows from rate; remove it")
     heartbeat = t.whole("heartbeat", 1, 250, 10)
     depth = t.whole("depth", 0, 14, 0)
+    delay = t.whole("delay", 0, depth, 0)
+    if "late" in t and not delay:
+        raise t.error("late", "frames that come after their sample's tick are for delay = 1 or more, with depth at least as large; set both or remove it")
     trigger = FusionTrigger(
         kind=kind,
         rate=t.number("rate", 0.02, 0.95) if not chosen else 0.0,
@@ -305,8 +309,9 @@ def _read_trigger(t: Table, n: int, m: int) -> FusionTrigger:
         silence=t.flag("silence", True),
         heartbeat=heartbeat,
         watchdog=t.whole("watchdog", heartbeat, 254, min(3 * heartbeat, 254)),
-        delay=t.whole("delay", 0, depth, 0),
+        delay=delay,
         depth=depth,
+        late=t.number("late", 0.0, 0.95, 0.5) if delay else 0.0,
         huber=t.number("huber", 0.0, 100.0, 0.0),
         loss=t.number("loss", 0.0, 0.3, 0.05),
         smoothing=t.number("smoothing", 0.0, 1.0, 1.0 / 128.0),

@@ -286,7 +286,7 @@ class Run:
             bits += self._count("sensor", frame)
             if gone:
                 lost |= 1 << i
-            elif waits and self.native.tables.delay:
+            elif waits:
                 self._waiting.append((i, frame))
             else:
                 self._deliver(i, frame, time_s)
@@ -316,8 +316,9 @@ class Run:
         self._write(frame, time_s)
         self.bus.send(frame)
         shared = frame_in(self.native.library, frame)
-        for node in (self.centre, *self.copies):
-            node.take(shared)
+        taken = [node.take(shared) for node in (self.centre, *self.copies)]
+        if taken[0] != self.native.library.lib.HG_OK:
+            return  # a late one that no sample is held for any more, or whose link is not to be trusted: the plain filter knows no links
         source = self.native.tables.source[i]
         value = _wire_value(frame, source.signal.resolution)
         period = (source.signal.maximum - source.signal.minimum + 1) * source.signal.resolution if source.wraps else 0.0
