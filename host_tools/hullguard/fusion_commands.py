@@ -52,7 +52,7 @@ def prepared(args: argparse.Namespace) -> FusionDesign:
 def _design_facts(made: FusionDesign) -> dict[str, Any]:
     """Thresholds, what silence is worth, and predicted errors."""
     model, t, first = made.model, made.tables, made.found[0]
-    deviation = np.sqrt(np.diag(made.mean.P))
+    deviation = np.sqrt(np.diag(made.told))
     worth = {f"{p:g}": [1.0 / (1.0 + r) if r >= 0.0 else 0.0 for r in row] for p, row in zip(LOSS_RATES, t.table[0].relax, strict=True)}
     return {
         "model": model.name,
@@ -163,7 +163,7 @@ def _drive(args: argparse.Namespace, made: FusionDesign, drive: Array, scenario:
         finally:
             if log is not None:
                 log.close()
-    facts = {"bus": bus_name, "seed": args.seed, "scenario": name, "loss": scenario.loss}
+    facts = {"bus": bus_name, "seed": args.seed, "scenario": name, "loss": scenario.loss, "late": scenario.late}
     result = plant.summary(made, native, trace, faults, facts)
     result["copies"]["node_digest"] = told.get("state.digest")
     if out is not None:
@@ -294,7 +294,8 @@ def run_plant(args: argparse.Namespace) -> int:
     with opened(**options) as link:
         run = plant.Run(made, native, plant.OnCan(link, native, args.lockstep), args.lockstep, make_speed(args.speed), start=MOVING if args.moving else REST)
         trace = run.samples(drive, plant.Sensors(made, drive, faults, scenario, args.seed), samples)
-    result = plant.summary(made, native, trace, faults, {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name, "loss": scenario.loss})
+    facts = {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name, "loss": scenario.loss, "late": scenario.late}
+    result = plant.summary(made, native, trace, faults, facts)
     _tell(args, result)
     emit(args, result)
     if run.mismatch:

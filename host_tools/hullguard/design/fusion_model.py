@@ -170,6 +170,20 @@ class FusionDesign:
         return mean_field(self.plant, self.found[0].rates, t.silence and t.kind == "innovation", t.kind == "innovation")
 
     @cached_property
+    def told(self) -> Array:
+        """[n, n] mean covariance of the estimate that is told with a tick: of the newest samples, as many as a frame may be late, `late` of the frames are missing."""
+        t, plant, found = self.model.trigger, self.plant, self.found[0]
+        P = self.mean.prior if t.delay else self.mean.P
+        for back in range(t.delay):
+            P = plant.A @ P @ plant.A.T + plant.Q if back else P
+            for i, c in enumerate(plant.C):
+                there = found.rates[i] * (1.0 - t.late)
+                share = there + (1.0 - there) * _shares(self.model, found, i, t.late)
+                g = P @ c
+                P = P - share * np.outer(g, g) / (c @ g + plant.R[i])
+        return P
+
+    @cached_property
     def tables(self) -> FusionTables:
         """What the library needs."""
         return tables_of(self)

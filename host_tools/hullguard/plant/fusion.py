@@ -458,7 +458,7 @@ def summary(made: FusionDesign, native: TrackerNative, trace: Trace, faults: Seq
     part = slice(min(SETTLE, first // 2), first)
     rms = np.sqrt(np.mean(e[part] ** 2, axis=0))
     share = np.mean(np.abs(e[part]) <= 2.0 * spread[part], axis=0)
-    predicted = np.sqrt(np.diag(made.mean.P))
+    predicted = np.sqrt(np.diag(made.told))
     sent = np.array([[b >> i & 1 for i in range(native.tables.sensors)] for b in trace.events])
     total = trace.total["sensor"] + trace.total["tick"] + trace.total["verdict"] + trace.total["estimate"]
     found = [_found(made, f, trace, first) for f in faults]

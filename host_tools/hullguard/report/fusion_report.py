@@ -146,7 +146,7 @@ def _summary(run: Run) -> list[str]:
     return [
         f"<h1>{esc(info['model'])}: {esc(said)}</h1>",
         f'<p class="lead">Scenario {esc(info["scenario"])}, {plural(info["samples"], "sample")} of {num(info["sample_time_s"])} s, '
-        f"{percent(info['loss'])} of the frames lost, seed {info['seed']}; bus: {esc(info['bus'])}. {esc(late)}</p>",
+        f"{percent(info['loss'])} of the frames lost, {percent(info['late'])} after the tick of their sample, seed {info['seed']}; bus: {esc(info['bus'])}. {esc(late)}</p>",
         '<div class="tiles">',
         tile("faulty sensors found", f"{len(hits)} of {len(found)}", late or "no fault", "good" if len(hits) == len(found) else "bad"),
         tile("false alarms", str(false), "a stated rate, not a bound", "bad" if false else "good"),
