@@ -1,5 +1,6 @@
-"""same.py SAMPLES: the five-sensor model with 15 % of the frames lost, at 100 Hz with half of them late and 5 % lost, and two cars; in process and on a CAN bus with the Linux node. In each run the copies of the filter, one a node, the
-plain filter that is told values without frames, and the node on the bus must have one digest of all states; and both runs the same. Exit status 1 otherwise.
+"""same.py SAMPLES: the five-sensor model with 15 % of the frames lost, the same at 100 Hz with half of its frames late and 5 % lost, and two cars; in process and
+on a CAN bus with the Linux node. In each run the copies of the filter, one a node, the plain filter that is told values without frames, and the node on the bus must
+have one digest of all states; and both runs the same. Exit status 1 otherwise.
 
 HULLGUARD_SEED=n: another course.
 """
