@@ -9,7 +9,9 @@ bench-speed: lib ## plant samples per second and core in a campaign, of every sh
 
 BENCH       := $(BUILD)/bench
 BENCH_REALS := f32 q31
-MODELS      := $(filter-out %_uio $(FUSION_MODELS),$(patsubst firmware/models/%.c,%,$(MODEL_SRC)))
+# Polynomial filters are counted by themselves (make bench-filters).
+FILTER_MODELS := $(notdir $(basename $(shell grep -l '^.if !HG_WITH_POLYNOMIAL' firmware/models/*.h)))
+MODELS      := $(filter-out %_uio $(FUSION_MODELS) $(FILTER_MODELS),$(patsubst firmware/models/%.c,%,$(MODEL_SRC)))
 RECORDER    := tests/bench/record.py
 
 # This machine is a target too, and has a C library as powerpc has.
