@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hullguard.core.kept import Kept
 from hullguard.core.library import Library
 from hullguard.design.fusion import LOSS_RATES, Fusion, TriggerTable
 from hullguard.errors import InputError
@@ -37,18 +38,8 @@ class Filter:
     rows: bool = False  # dense rows even where a selection would do
 
 
-class Native:
-    """Filter configurations in one library; the memory they lie in lives as long as this."""
-
-    def __init__(self, library: Library) -> None:
-        self.library = library
-        self._keep: list[Any] = []
-
-    def new(self, kind: str, value: Any = None) -> Any:
-        """A C object."""
-        made = self.library.ffi.new(kind, value)
-        self._keep.append(made)
-        return made
+class Native(Kept):
+    """Filter configurations in one library."""
 
     def reals(self, values: Any) -> Any:
         """An array of hg_real."""

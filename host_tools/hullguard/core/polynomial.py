@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hullguard.core.kept import Kept
 from hullguard.core.library import Library
 from hullguard.design.polynomial import Map, Noise, Tables
 from hullguard.errors import InputError
@@ -31,18 +32,8 @@ class Levels:
     fresh: float = 0.0  # of every output
 
 
-class Native:
-    """Filter configurations in one library; the memory they lie in lives as long as this."""
-
-    def __init__(self, library: Library) -> None:
-        self.library = library
-        self._keep: list[Any] = []
-
-    def new(self, kind: str, value: Any = None) -> Any:
-        """A C object."""
-        made = self.library.ffi.new(kind, value)
-        self._keep.append(made)
-        return made
+class Native(Kept):
+    """Filter configurations in one library."""
 
     def array(self, kind: str, values: Any) -> Any:
         """An array of numbers of this type."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -36,12 +35,12 @@ from hullguard.design.fusion import (
     scheduled,
 )
 from hullguard.design.protection import own_protection
-from hullguard.design.store import HEADER, path_of
+from hullguard.design.store import HEADER, opened, path_of
 from hullguard.design.tables import EXTENDED, FLOAT32, SIGNED, MessageTable, SignalTable, _plain
 from hullguard.errors import InputError
 from hullguard.model.fusion import FusionModel, FusionSensor, _next
 from hullguard.model.schema import Frame
-from hullguard.model.table import Array, Table
+from hullguard.model.table import Array
 
 VERSION = 1  # rises when the same model would give other numbers
 KEPT = 9  # significant digits of what a search found
@@ -264,14 +263,8 @@ def write(path: Path, name: str, model: FusionModel, found: tuple[Found, ...]) -
 
 def read(path: Path, model: FusionModel) -> tuple[Found, ...] | None:
     """A design file's thresholds; None when there is none for this very model."""
-    if not path.exists():
-        return None
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path.name}: not a readable design file ({error}); run hullguard design again") from error
-    top = Table(data, path.name)
-    if top.whole("version", 0, 10_000) != VERSION or top.text("model_sha256") != model.sha256:
+    top = opened(path, VERSION)
+    if top is None or top.text("model_sha256") != model.sha256:
         return None
     found = []
     for t in top.tables("fusion"):

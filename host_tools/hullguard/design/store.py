@@ -116,8 +116,8 @@ def _read_uio(t: Table) -> StoredUio:
     return made
 
 
-def read(path: Path) -> Stored | None:
-    """Read a design file; None when there is none, or one of another version, whose numbers are not today's."""
+def opened(path: Path, version: int) -> Table | None:
+    """A design file; None when there is none, or one of another version, whose numbers are not today's."""
     if not path.exists():
         return None
     try:
@@ -125,7 +125,13 @@ def read(path: Path) -> Stored | None:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise InputError(f"{path.name}: not a readable design file ({error}); run hullguard design again") from error
     top = Table(data, path.name)
-    if top.whole("version", 0, 10_000) != VERSION:
+    return top if top.whole("version", 0, 10_000) == version else None
+
+
+def read(path: Path) -> Stored | None:
+    """Read a design file; None where opened() says so."""
+    top = opened(path, VERSION)
+    if top is None:
         return None
     plant, signals = top.table("plant"), top.table("signals")
     observers = []

@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hullguard.design.statistic import STATISTICS
-from hullguard.errors import InputError
 from hullguard.model.table import Array
 from hullguard.report import run_figures as draw
+from hullguard.report.columns import read_columns
 from hullguard.report.page import AMBER, BLUE, GREEN, INK, esc, num, picture, table
 from hullguard.report.run_data import Run
 
@@ -45,19 +45,13 @@ class Filter:
 
 def read_filters(directory: Path, info: dict[str, Any]) -> list[Filter]:
     """All of filters.csv; none where a run has no polynomial filter."""
-    path = directory / FILE
-    if not path.is_file():
+    column = read_columns(directory / FILE)
+    if not column:
         return []
-    with path.open(encoding="utf-8") as file:
-        header = file.readline().strip().split(",")
-        data = np.loadtxt(file, delimiter=",", ndmin=2)
-    if data.shape[1] != len(header):
-        raise InputError(f"{path}: {data.shape[1]} columns below {len(header)} names; make the run again")
-    column = {name: data[:, i] for i, name in enumerate(header)}
     found = []
     for row in info["filters"]:
         key = f"{row['filter']}.{row['degree']}."
-        names = [n.removeprefix(key).removesuffix(".deviation") for n in header if n.startswith(key) and n.endswith(".deviation")]
+        names = [n.removeprefix(key).removesuffix(".deviation") for n in column if n.startswith(key) and n.endswith(".deviation")]
         states = {n: (column[key + n], column[f"{key}{n}.deviation"], column.get(f"{key}{n}.truth")) for n in names}
         ratio = {s: column[f"{key}r.{s}"] / np.maximum(column[f"{key}J.{s}"], 1e-30) for s in STATISTICS}
         found.append(Filter(row["filter"], row["degree"], row["own"], row, states, ratio))

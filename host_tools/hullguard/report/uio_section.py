@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hullguard.errors import InputError
 from hullguard.model.table import Array
 from hullguard.report import run_figures as draw
+from hullguard.report.columns import read_columns
 from hullguard.report.page import AMBER, BLUE, INK, num, picture, table
 from hullguard.report.run_data import Run
 
@@ -45,15 +45,9 @@ class Estimate:
 
 def read_estimates(directory: Path, info: dict[str, Any]) -> list[Estimate]:
     """All of estimates.csv; none where a run has no unknown-input observer."""
-    path = directory / FILE
-    if not path.is_file():
+    column = read_columns(directory / FILE)
+    if not column:
         return []
-    with path.open(encoding="utf-8") as file:
-        header = file.readline().strip().split(",")
-        data = np.loadtxt(file, delimiter=",", ndmin=2)
-    if data.shape[1] != len(header):
-        raise InputError(f"{path}: {data.shape[1]} columns below {len(header)} names; make the run again")
-    column = {name: data[:, i] for i, name in enumerate(header)}
     found = []
     for row in info["estimates"]:
         key = f"{row['observer']}.{row['name']}"
