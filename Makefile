@@ -1,6 +1,7 @@
 # hullguard. Everything that is built goes to $(BUILD); sources are found by wildcards, so that a new file needs no line here.
 # V=1 shows the commands. A folder may add targets of its own in a *.mk file (see the include at the end), parts of `make test` by
-# TEST_PARTS += NAME and parts of `make check` by CHECK_PARTS += NAME. A target with a ## comment shows up in `make help`.
+# TEST_PARTS += NAME, of `make check` by CHECK_PARTS += NAME, of `make check-deep` by DEEP_PARTS += NAME. A target with a ## comment
+# shows up in `make help`.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -54,6 +55,7 @@ RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig
 OBJECTS :=
 TEST_PARTS := lib
 CHECK_PARTS := lib
+DEEP_PARTS := lib
 
 # --- what to run ---------------------------------------------------------------------------------------------------------------------
 
@@ -70,15 +72,19 @@ setup-test: ## the same for the tests
 # The parts start after the set-up, in a make of their own, because they may need what it installs.
 parts = $(MAKE) $(if $(filter --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc)) -Otarget
 
-.PHONY: test check
+.PHONY: test check check-deep
 test: ## set up all that is needed, build, test the library and the host tools
 	@host_tools/setup.sh test
 	@+$(parts) $(TEST_PARTS)
 	@echo "all tests passed: $(TEST_PARTS)"
 check: ## the same for what takes other processors: targets, emulated boards, faulty frames, sizes; and coverage
-	@host_tools/setup.sh test
+	@host_tools/setup.sh check
 	@+$(parts) $(CHECK_PARTS)
 	@echo "all checks passed: $(CHECK_PARTS)"
+check-deep: ## what takes hours: the long forms of proofs, mutation and fuzzing
+	@host_tools/setup.sh deep
+	@+$(parts) $(DEEP_PARTS)
+	@echo "all deep checks passed: $(DEEP_PARTS)"
 
 .PHONY: clean
 clean: ## remove what was built (not .venv)

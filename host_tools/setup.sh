@@ -1,10 +1,14 @@
 #!/bin/bash
-# setup.sh demo|test: system packages, then a virtual environment in .venv with the command `hullguard`.
+# setup.sh demo|test|check|deep: system packages, then a virtual environment in .venv with the command `hullguard`. Each level has what those before it have.
 # Says nothing and does nothing when all is there. The environment (proxies, certificates, indexes) is passed through.
 # Exit status: 0 ready, 2 something only the user can do (one line on stderr says what), else that of the step that failed.
 set -u
 level=${1:-}
-case $level in demo|test) ;; *) echo "usage: setup.sh demo|test" >&2; exit 2;; esac
+levels="demo test check deep"
+# Of these levels, up to the one named; and from the one named on.
+up_to() { local l; for l in $levels; do echo "$l"; [ "$l" != "$1" ] || break; done; }
+from() { echo "$levels" | grep -o "\b$1\b.*"; }
+case " $levels " in *" $level "*) ;; *) echo "usage: setup.sh ${levels// /|}" >&2; exit 2;; esac
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd) || exit 2
 venv=$root/.venv
 tools=$root/host_tools
@@ -16,12 +20,12 @@ fail() { echo "setup: $*" >&2; exit 2; }
 
 # The package names of every section up to the level's own.
 packages() {
-    local line section=
+    local line wanted=
     while read -r line; do
         case $line in
             ''|'#'*) ;;
-            '['*']') section=${line//[][]/};;
-            *) if [ "$section" = demo ] || [ "$section" = "$level" ]; then echo "$line"; fi;;
+            '['*']') wanted=$(up_to "$level" | grep -x "${line//[][]/}");;
+            *) [ -z "$wanted" ] || echo "$line";;
         esac
     done <"$list"
 }
@@ -45,6 +49,8 @@ install_packages() {
 look_for_tools() {
     local tool absent=() wanted=(gcc linux.uml ip)
     [ "$level" = demo ] || wanted+=(g++ clang-19 llvm-profdata-19 valgrind candump qemu-system-riscv32 qemu-system-aarch64 riscv64-unknown-elf-gcc arm-none-eabi-gcc)
+    case $level in check|deep) wanted+=(frama-c why3 z3 gappa);; esac
+    [ "$level" != deep ] || wanted+=(afl-fuzz afl-clang-fast)
     for tool in "${wanted[@]}"; do
         PATH=$PATH:/usr/sbin:/sbin command -v "$tool" >/dev/null || absent+=("$tool")
     done
@@ -75,10 +81,14 @@ find_python() {
     fail "Python 3.11 or newer is needed: no python3 on PATH is (found: $(python3 --version 2>&1 | head -n 1))"
 }
 
+# The file of Python packages of a level; `deep` needs none beyond those of `check`.
+requirements() { echo "$tools/requirements-${1/deep/check}.txt"; }
+
 # What .venv was made from. Its own path is part of it, because the scripts in a virtual environment hold that path.
 fingerprint() {
-    echo "$venv $level"
-    sha256sum "$tools/setup.sh" "$tools/requirements-demo.txt" "$tools/requirements-$level.txt" "$tools/pyproject.toml" | cut -d' ' -f1
+    local l
+    echo "$venv $1"
+    for l in $(up_to "$1"); do requirements "$l"; done | xargs sha256sum "$tools/setup.sh" "$tools/pyproject.toml" | cut -d' ' -f1
 }
 
 # Finding is enough: importing would cost the start-up time of everything the package uses.
@@ -87,8 +97,11 @@ imports='import importlib.util, sys; sys.exit(importlib.util.find_spec("hullguar
 # Ready if the stamp of this level, or of a higher one, is that of the present files, and the interpreter still starts.
 ready() {
     [ -x "$venv/bin/hullguard" ] && "$venv/bin/python" -I -c "$imports" 2>/dev/null || return 1
-    [ "$(cat "$venv/stamp-$level" 2>/dev/null)" = "$(fingerprint)" ] && return 0
-    [ $level = demo ] && [ "$(cat "$venv/stamp-test" 2>/dev/null)" = "$(level=test; fingerprint)" ]
+    local l
+    for l in $(from "$level"); do
+        [ "$(cat "$venv/stamp-$l" 2>/dev/null)" != "$(fingerprint "$l")" ] || return 0
+    done
+    return 1
 }
 
 make_venv() {
@@ -105,7 +118,8 @@ pip_install() { "$venv/bin/python" -m pip install -q --disable-pip-version-check
 
 # uv is several times quicker than pip, but it is only a quicker way: where it is not to be had, pip does the same.
 install_python_packages() {
-    local requirements=$tools/requirements-$level.txt
+    local requirements
+    requirements=$(requirements "$level")
     export UV_SYSTEM_CERTS=${UV_SYSTEM_CERTS:-1}
     say "installing Python packages ($level)"
     "$venv/bin/uv" --version 2>/dev/null | grep -qF "${uv/==/ }" || pip_install "$uv" 2>/dev/null || say "no uv here; using pip"
@@ -129,7 +143,7 @@ python_environment() {
     rm -f "$venv/stamp-$level"
     install_python_packages || { say "installing Python packages failed" >&2; exit 1; }
     "$venv/bin/python" -I -c "$imports" || { say "host_tools/hullguard is not there or cannot be found by Python" >&2; exit 1; }
-    fingerprint >"$venv/stamp-$level"   # last: without it the next run repairs
+    fingerprint "$level" >"$venv/stamp-$level"   # last: without it the next run repairs
 }
 
 system_packages
