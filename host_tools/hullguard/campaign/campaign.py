@@ -11,7 +11,7 @@ import numpy as np
 
 from hullguard.campaign.case import COLUMNS, Case, Rows, chunk, runs_a_chunk
 from hullguard.campaign.chunks import Chunks
-from hullguard.campaign.tasks import deaf
+from hullguard.campaign.tasks import deaf, stop
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def processes(workers: int) -> Way:
                 for done in as_completed(waiting):
                     yield waiting[done], done.result()
             except BaseException:
-                pool.shutdown(cancel_futures=True)
+                stop(pool)
                 raise
 
     return work

@@ -87,8 +87,8 @@ def _vectors(G: Array) -> tuple[Complex, Complex]:
     with np.errstate(divide="ignore", invalid="ignore"):
         vectors[np.ix_(low, np.arange(len(values)))] = (G[np.ix_(low, ~low)] @ inner) / (values[None, :] - own[:, None])
     vectors[np.ix_(low, np.arange(len(values), len(G)))] = np.eye(len(own))
-    length = np.linalg.norm(vectors, axis=0)
-    return np.concatenate([values, own]), np.asarray(vectors / length)
+    with np.errstate(invalid="ignore"):  # vectors of equal poles are infinite: the caller refuses them
+        return np.concatenate([values, own]), np.asarray(vectors / np.linalg.norm(vectors, axis=0))
 
 
 def _modes(lin: Linear, where: str) -> tuple[Array, Complex, Complex]:
