@@ -79,11 +79,15 @@ test: ## set up all that is needed, build, test the library and the host tools
 	@echo "all tests passed: $(TEST_PARTS)"
 check: ## the same for what takes other processors: targets, emulated boards, faulty frames, sizes; and coverage
 	@host_tools/setup.sh check
+	@rm -f $(CHECK_PARTS:%=$(BUILD)/results/%.json)
 	@+$(parts) $(CHECK_PARTS)
+	@+$(MAKE) seeded
+	@+$(MAKE) promises-check
 	@echo "all checks passed: $(CHECK_PARTS)"
 check-deep: ## what takes hours: the long forms of proofs, mutation and fuzzing
 	@host_tools/setup.sh deep
 	@+$(parts) $(DEEP_PARTS)
+	@+$(MAKE) seeded-deep
 	@echo "all deep checks passed: $(DEEP_PARTS)"
 
 .PHONY: clean
@@ -131,6 +135,8 @@ $(eval $(call archive,$(STATIC_LIB),$(BUILD)/static-f32,$(LIB_SRC)))
 
 .PHONY: unit
 unit: ## unit tests (CMocka) with gcc, gcc + ASan + UBSan, clang; f32 and f64, some for Q31 or without optional parts
+	@$(RESULT) $@ 'every module does what its header says: float32, float64, fixed point and without optional parts; gcc, gcc with AddressSanitizer and UBSan, clang' \
+	    "$(call tests_run,$(BUILD)/unit/*/*.log) tests passed in $(words $^) programs"
 TEST_PARTS += unit
 
 # A test whose program has not changed since it passed is not run again; its output is beside it, in .log.
@@ -173,6 +179,7 @@ $(BUILD)/with-vcan/with-vcan-init: tests/with-vcan/with-vcan-init.c Makefile
 
 .PHONY: contract
 contract: ## one suite for every HAL backend: loopback, and SocketCAN under with-vcan
+	@$(RESULT) $@ 'every HAL backend passes one suite of what a backend promises: loopback, and SocketCAN on a bus' "$(call tests_run,$(BUILD)/contract/*/*/*.log) tests passed in $(words $^) programs"
 TEST_PARTS += contract
 
 # How a rig is started; nothing: directly. AddressSanitizer's shadow does not fit into the 512 GB that a process has in User-Mode Linux,

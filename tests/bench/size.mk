@@ -19,6 +19,7 @@ size: $(call size_elfs,$(TARGETS)) ## flash, RAM and worst-case stack, beside th
 	@$(call size_run,$(TARGETS),$(if $(JSON),--json) $(if $(FORMAT),--format $(FORMAT) --model $(MODEL)))
 size-quick: $(call size_elfs,$(SIZE_QUICK)) ## the same of a few targets
 	@$(call size_run,$(SIZE_QUICK),--quiet)
+	@$(RESULT) $@ 'flash, RAM and worst-case stack of every model stay within the committed budget' '$(words $(call size_elfs,$(SIZE_QUICK))) programs on $(SIZE_QUICK)'
 size-step: size-step-$(TARGET)-$(MODEL)-$(REAL) ## flash of a detector's step, function by function and table by table (TARGET, MODEL, REAL as for bench-step)
 size-budget: $(call size_elfs,$(TARGETS)) ## take today's sizes for the budget
 	@$(call size_run,$(TARGETS),--write)

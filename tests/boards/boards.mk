@@ -23,6 +23,8 @@ boards-node: $(BOARDS_BUILT) ## the tests of a node on a bus, on emulated boards
 boards-short: $(BOARDS_BUILT)
 	@PYTHONPATH=host_tools $(WITH_VCAN) -m $(BOARD_GUEST) -n 2 -t 400 $(PY) tests/boards/short_inside.py $(abspath $(BOARDS)/out) >$(BOARDS)/short.log 2>&1 || { cat $(BOARDS)/short.log; exit 1; }
 	@grep '^  ok  ' $(BOARDS)/short.log
+	@$(RESULT) $@ 'a detector node on an emulated board answers the frames that the Linux node gets with the same bytes, faulty frames too; a sensor node sends what the host sends' \
+	    "$$(grep -c '^  ok  ' $(BOARDS)/short.log) parts on $(words $(BOARD_NAMES)) boards"
 CHECK_PARTS += boards-short
 
 # The contract suite of every HAL on the board itself.
@@ -37,6 +39,8 @@ boards-contract: boards-images
 	@for b in $(BOARD_NAMES); do \
 	  PYTHONPATH=host_tools $(PY) tests/boards/contract_run.py $$b >$(BOARDS)/$$b-contract.log 2>&1 || { cat $(BOARDS)/$$b-contract.log; exit 1; }; \
 	  echo "  ok  contract on board $$(tail -n 1 $(BOARDS)/$$b-contract.log)"; done
+	@$(RESULT) $@ 'every board passes the suite of the HAL backends: as an image in its emulator, and its driver against a model of the registers, bus errors too' \
+	    "$$(for b in $(BOARD_NAMES); do tail -n 1 $(BOARDS)/$$b-contract.log; done | tr '\n' ';' | sed 's/;$$//; s/;/; /g')"
 CHECK_PARTS += boards-contract
 
 # The same suite on the host, against models of the registers: the drivers as they are for silicon, and errors, which no emulator makes.

@@ -15,6 +15,8 @@ OBJECTS += $(ORACLE_ONCE) $(ORACLE_TESTS:=.o)
 oracle: $(ORACLE_TESTS) $(ORACLE_BUILD)/oracle_run ## the library against an independent implementation in double precision (random; HULLGUARD_SEED=n repeats)
 	$(Q)set -e; for test in $(ORACLE_TESTS); do ASAN_OPTIONS=detect_leaks=0 timeout 300 $$test; done
 	$(Q)sh $(ORACLE)/test_oracle_run.sh $(ORACLE_BUILD)/oracle_run $(ORACLE)
+	@$(RESULT) $@ 'on random problems the library agrees with a second implementation in double precision (Eigen), without a finding of AddressSanitizer or UBSan' \
+	    'no difference in $(words $(ORACLE_TESTS)) programs'
 TEST_PARTS += oracle
 
 $(ORACLE_ONCE): $(ORACLE_BUILD)/%.o: $(ORACLE)/%.cpp $(ORACLE)/oracle.mk

@@ -7,4 +7,5 @@ suspension-study: lib ## 10 000 s of roads: false alarms, frames, delays, parts 
 suspension-short: lib
 	@$(PY) tests/suspension/study.py 6 3 >$(BUILD)/suspension.log 2>&1 || { cat $(BUILD)/suspension.log; exit 1; }
 	@echo "  ok  suspension on random roads"
+	@$(RESULT) $@ 'on random roads the suspension raises no false alarm, finds forces and reads them, and names weak parts as often as it has to' 'seconds of road: all numbers met'
 TEST_PARTS += suspension-short

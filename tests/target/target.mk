@@ -50,6 +50,9 @@ target_run     = QEMU_AUDIO_DRV=none timeout --foreground -k 5 900 $(RUN_$(1)) $
 CHECK_PARTS += target-quick
 target-tests: target-image target-corpus target-node target-unit $(TARGET_TESTS)/seeded.ok ## all targets: contents of the images, the host's bits, unit tests under QEMU
 target-quick: target-image $(CORPUS_QUICK:%=$(TARGET_TESTS)/%/corpus.ok) target-node $(UNIT_QUICK) $(TARGET_TESTS)/seeded.ok ## the part of it that is in `make check`
+	@$(RESULT) $@ 'an image holds no floating-point instruction in fixed point, no arithmetic in double, no C library and no name without hg_' '$(words $(BUILDS)) images' \
+	    'every processor computes the same bits as the host, in float32 and in fixed point' '$(words $(CORPUS_QUICK)) builds under emulation' \
+	    'the unit tests pass on processors without and with an FPU and on a big-endian one' '$(words $(UNIT_QUICK)) programs under emulation'
 target-image: $(BUILDS:%=$(FIRMWARE)/%/image.ok)
 target-corpus: $(RUN_BUILDS:%=$(TARGET_TESTS)/%/corpus.ok)
 target-node: $(RUN_BUILDS:%=$(TARGET_TESTS)/%/node.ok)
