@@ -35,12 +35,14 @@ CC_gcc     = $(CC) $(OPTIMISE)
 CC_asan    = $(CC) $(SANITIZE),address
 CC_clang   = $(CLANG) $(OPTIMISE)
 
-# Unit tests that are for one build alone: fixed point, and a library without what a model may do without. And those that no number type has a part in.
-UNIT_BUILDS     := q31 bare
+# Unit tests that are for one build alone: fixed point, a library without what a model may do without, and one for one model's sizes only. And those that no number type has a part in.
+UNIT_BUILDS     := q31 bare only
 UNIT_TESTS_q31  := test_q31
 UNIT_TESTS_bare := test_bare
+UNIT_TESTS_only := test_only
 UNIT_ONCE       := test_e2e_errors
 REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH POLYNOMIAL)
+REAL_FLAG_only  := $(REAL_FLAG_f32) -DHG_CONFIG_HEADER='"platoon_bank_config.h"'
 
 LIB_SRC     := $(wildcard firmware/src/*.c)
 MODEL_SRC   := $(wildcard firmware/models/*.c)
@@ -48,7 +50,7 @@ FUSION_MODELS := $(notdir $(basename $(shell grep -l 'hullguard/tracker\.h' firm
 CORE_SRC    := $(wildcard host_tools/hullguard/core/*.c)
 HOST_HAL    := loopback socketcan
 HOST_HAL_SRC := $(foreach h,$(HOST_HAL),$(wildcard hal/$(h)/*.c))
-UNIT_TESTS  := $(filter-out $(UNIT_TESTS_q31) $(UNIT_TESTS_bare),$(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c)))
+UNIT_TESTS  := $(filter-out $(foreach b,$(UNIT_BUILDS),$(UNIT_TESTS_$(b))),$(patsubst tests/unit/%.c,%,$(wildcard tests/unit/test_*.c)))
 UNIT_DATA   := $(wildcard tests/fixtures/*)
 RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig_*.c))
 
@@ -146,6 +148,7 @@ run_test = timeout --foreground -k 5 300 $(1) >$(2).log 2>&1 && touch $(2).ok &&
 # The tables of the models are floats; models that need an optional part do not compile without it.
 $(foreach r,$(FLOATS),$(eval UNIT_MODELS_$(r) := $(MODEL_SRC)))
 UNIT_MODELS_bare := $(filter-out $(patsubst %.h,%.c,$(shell grep -l '^.if !HG_WITH_' firmware/models/*.h)),$(MODEL_SRC))
+UNIT_MODELS_only := firmware/models/platoon_bank.c
 unit_tests = $(or $(UNIT_TESTS_$(1)),$(if $(filter f64,$(1)),$(filter-out $(UNIT_ONCE),$(UNIT_TESTS)),$(UNIT_TESTS)))
 unit_src   = $(LIB_SRC) $(UNIT_MODELS_$(1)) $(HOST_HAL_SRC)
 

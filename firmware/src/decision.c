@@ -7,8 +7,8 @@ hg_status hg_decision_start(hg_decision *self, const hg_decision_config *config,
     if ((self == NULL) || (config == NULL) || (alarm == NULL)) {
         return HG_E_ARGUMENT;
     }
-    if ((config->generators < 1U) || (config->generators > HG_GENERATORS_MAX) || (!HG_SIZE_FITS(HG_ONLY_JUDGED, config->generators)) || (config->up < 1U) || (config->down < 1U) ||
-        (config->feeds == NULL) || (config->faults == NULL)) {
+    const bool sized = (config->generators >= 1U) && (config->generators <= HG_GENERATORS_MAX) && HG_SIZE_FITS(HG_ONLY_JUDGED, config->generators);
+    if ((!sized) || (config->up < 1U) || (config->down < 1U) || (config->feeds == NULL) || (config->faults == NULL)) {
         return HG_E_CONFIG;
     }
     self->config = config;

@@ -41,8 +41,9 @@ static bool with_mismatch(const hg_detector_config *config)
 /* Has this image all that a configuration asks for? */
 static bool parts_there(const hg_detector_config *config)
 {
+    const bool by_zonotope = BY_ZONOTOPE(config);
     return (predictors_of(config) == config->predictors) && (banks_of(config) == config->banks) &&
-           (with_mismatch(config) == (config->mismatch != NULL)) && (BY_ZONOTOPE(config) == (config->zonotope != NULL)) &&
+           (with_mismatch(config) == (config->mismatch != NULL)) && (by_zonotope == (config->zonotope != NULL)) &&
            (POLYNOMIALS(config) == config->polynomials);
 }
 
@@ -420,7 +421,8 @@ static void rewrite(hg_detector *self, uint8_t group, uint8_t first, uint8_t rew
     /* What was before the beginning is the initial state's business, which the thresholds hold already. */
     const uint8_t known = (rewind < self->samples) ? rewind : self->samples;
     const uint8_t lags = (known < kept) ? known : kept;
-    if ((predictors_of(config) == 0U) && (!with_mismatch(config)) && (!BY_ZONOTOPE(config))) {
+    const bool by_zonotope = BY_ZONOTOPE(config);
+    if ((predictors_of(config) == 0U) && (!with_mismatch(config)) && (!by_zonotope)) {
         hg_hold_rewrite(&self->memory.hold[group], &self->radii, first, lags); /* a hull asks for no more than the new radii */
     } else {
         for (uint8_t lag = 1U; lag <= lags; lag++) {

@@ -39,7 +39,8 @@ static bool field_valid(const hg_message *message, const hg_field *field)
 {
     const bool is_signed = (field->flags & HG_FIELD_SIGNED) != 0U;
     const bool is_float = (field->flags & HG_FIELD_FLOAT32) != 0U;
-    bool valid = (field->length >= 1U) && (field->length <= ((is_signed || is_float) ? 32U : 31U));
+    const uint8_t longest = (is_signed || is_float) ? 32U : 31U;
+    bool valid = (field->length >= 1U) && (field->length <= longest);
     valid = valid && ((!is_float) || ((field->length == FLOAT32_BITS) && (HG_REAL_Q31 == 0)));
     for (uint8_t i = 0U; valid && (i < field->length); i++) {
         const uint16_t bit = position(field, i);

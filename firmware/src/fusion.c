@@ -520,22 +520,16 @@ hg_status hg_fusion_due(const hg_fusion *self, uint8_t i, hg_real y, hg_real dic
     const hg_real level = slot->table->level[i];
     const hg_real r = y - entry->reference;
     bool speaks = false;
-    switch (config->trigger) {
-    case HG_FUSION_OBSERVATION:
+    if (config->trigger == HG_FUSION_OBSERVATION) {
         speaks = (r * r) > level;
-        break;
-    case HG_FUSION_INNOVATION:
+    } else if (config->trigger == HG_FUSION_INNOVATION) {
         speaks = (r * r) > (level * entry->variance);
-        break;
-    case HG_FUSION_STOCHASTIC:
+    } else if (config->trigger == HG_FUSION_STOCHASTIC) {
         speaks = (level * (r * r)) > (dice * entry->variance);
-        break;
-    case HG_FUSION_SCHEDULED:
+    } else if (config->trigger == HG_FUSION_SCHEDULED) {
         speaks = entry->expected;
-        break;
-    case HG_FUSION_OWN:
-    default:
-        break;
+    } else {
+        /* HG_FUSION_OWN: the heartbeat alone */
     }
     speaks = speaks && ((slot->excluded & bit(i)) == 0U);
     return (speaks || (entry->age >= config->heartbeat)) ? HG_OK : HG_E_EMPTY;

@@ -1,25 +1,22 @@
-# make coverage: line and branch coverage of the library by its unit tests, all builds merged; less than all of it is an error.
+# make coverage: lines, branches and conditions (MC/DC) of the library that its unit tests cover, all builds together; less than all is an error.
 
 COVERAGE := $(BUILD)/coverage
-GCOVR    ?= .venv/bin/gcovr
 COVERAGE_BUILDS := $(FLOATS) $(UNIT_BUILDS)
-# A function of real.h stands there once for each number type.
-REPORT   := $(GCOVR) --root . --merge-mode-functions separate --filter 'firmware/src/' --filter 'firmware/include/'
+COVERAGE_CC = $(CLANG) -O1 -g
+INSTRUMENT  = -fprofile-instr-generate -fcoverage-mapping -fcoverage-mcdc
 
 .PHONY: coverage
-coverage: $(COVERAGE_BUILDS:%=$(COVERAGE)/%/ran) ## line and branch coverage of the library by the unit tests; fails below 100 %
-	@$(REPORT) --json $(COVERAGE)/all.json $(COVERAGE)
-	@$(REPORT) --add-tracefile $(COVERAGE)/all.json --txt-metric branch --txt
-	@$(REPORT) --add-tracefile $(COVERAGE)/all.json --fail-under-line 100 --fail-under-branch 100 --txt
+coverage: tests/unit/coverage.py tests/unit/coverage.toml ## line, branch and MC/DC coverage of the library by the unit tests; fails below 100 %
+	@$(PY) $< --results $(BUILD)/results/coverage.json $(COVERAGE) $(COVERAGE_BUILDS)
 
-# Counters of an earlier run are removed: they may belong to code that is no longer there.
+# $(call coverage_variant,BUILD): models and backends carry no counters. The tests do: what of a header only they call is compiled into them.
 define coverage_variant
-$(eval $(call objects,$(COVERAGE)/$(1),$(call unit_src,$(1)) $(patsubst %,tests/unit/%.c,$(call unit_tests,$(1))),$$(CC) -O0 -g --coverage $(REAL_FLAG_$(1))))
+$(eval $(call objects,$(COVERAGE)/$(1),$(LIB_SRC) $(patsubst %,tests/unit/%.c,$(call unit_tests,$(1))),$$(COVERAGE_CC) $$(INSTRUMENT) $(REAL_FLAG_$(1))))
+$(eval $(call objects,$(COVERAGE)/$(1),$(UNIT_MODELS_$(1)) $(HOST_HAL_SRC),$$(COVERAGE_CC) $(REAL_FLAG_$(1))))
 $(patsubst %,$(COVERAGE)/$(1)/%,$(call unit_tests,$(1))): $(COVERAGE)/$(1)/%: $(COVERAGE)/$(1)/tests/unit/%.o $(patsubst %.c,$(COVERAGE)/$(1)/%.o,$(call unit_src,$(1)))
-	$$(Q)$$(CC) --coverage -o $$@ $$^ -lcmocka -lm
-$(COVERAGE)/$(1)/ran: $(patsubst %,$(COVERAGE)/$(1)/%,$(call unit_tests,$(1)))
-	@find $(COVERAGE)/$(1) -name '*.gcda' -delete
-	@for test in $$^; do $$$$test >$$$$test.log 2>&1 || { cat $$$$test.log; echo "FAILED $$$$test"; exit 1; }; done
-	@touch $$@
+	$$(Q)$$(COVERAGE_CC) $$(INSTRUMENT) -o $$@ $$^ -lcmocka -lm
+$(patsubst %,$(COVERAGE)/$(1)/%.profraw,$(call unit_tests,$(1))): %.profraw: % $(UNIT_DATA)
+	@LLVM_PROFILE_FILE=$$@ $$< >$$<.log 2>&1 || { cat $$<.log; echo "FAILED $$<"; exit 1; }
+coverage: $(patsubst %,$(COVERAGE)/$(1)/%.profraw,$(call unit_tests,$(1)))
 endef
 $(foreach r,$(COVERAGE_BUILDS),$(eval $(call coverage_variant,$(r))))

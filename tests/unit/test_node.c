@@ -598,6 +598,33 @@ static void a_counter_that_jumped_is_refused_once(void **state)
     }
 }
 
+/* Which level a sender is on nobody knows: the shortest silence of all says how often it can have spoken. */
+static void of_several_silences_the_shortest_counts(void **state)
+{
+    (void)state;
+    static const uint8_t silences[2][2] = {{1U, 2U}, {2U, 1U}};
+    for (uint8_t i = 0U; i < 2U; i++) {
+        for (uint32_t passed = 1U; passed < 12U; passed++) {
+            for (uint32_t moved = 1U; moved < 8U; moved++) {
+                static rig r;
+                hg_trigger_config trigger = sm_trigger_a;
+                trigger.silence = silences[i];
+                hg_hold_config hold[SM_GROUPS] = {sm_hold[0], sm_hold[1]};
+                hold[0].trigger = &trigger;
+                hg_detector_config detector = sm_detector;
+                detector.hold = hold;
+                hg_node_config config = usual;
+                config.detector = &detector;
+                begin_with(&r, &config, HG_START_REST);
+                sample(&r, 0U, 0, 0, 0);
+                ticks(&r, 1U, passed);
+                r.counter[0] = (uint8_t)(r.counter[0] + moved - 1U);
+                assert_status((moved <= (passed / 2U)) ? HG_OK : HG_E_SEQUENCE, give(&r, 0U, passed, 0, 0));
+            }
+        }
+    }
+}
+
 /* After a silence in which more frames can have been sent than any step can say, every counter fits. */
 static void after_a_very_long_silence_any_counter_fits(void **state)
 {
@@ -1605,6 +1632,7 @@ int main(void)
         cmocka_unit_test(a_stamp_may_be_ignored),
         cmocka_unit_test(lost_frames_are_counted_by_the_sequence),
         cmocka_unit_test(a_counter_that_jumped_is_refused_once),
+        cmocka_unit_test(of_several_silences_the_shortest_counts),
         cmocka_unit_test(after_a_very_long_silence_any_counter_fits),
         cmocka_unit_test(a_missing_tick_is_a_step),
         cmocka_unit_test(one_late_tick_is_a_straggler),
