@@ -1,7 +1,9 @@
 #include "models.h"
 
 #include "battery_cell.h"
+#include "battery_pack.h"
 #include "cubic_suspension.h"
+#include "dc_motor.h"
 #include "openacc.h"
 #include "platoon.h"
 #include "platoon_bank.h"
@@ -16,7 +18,8 @@
 #define MODELS(X)                                                                                                          \
     X(platoon, PLATOON) X(platoon_bank, PLATOON_BANK) X(openacc, OPENACC) X(suspension, SUSPENSION)                        \
     X(suspension_published, SUSPENSION_PUBLISHED) X(cubic_suspension, CUBIC_SUSPENSION)                                    \
-    X(quadratic_sensor, QUADRATIC_SENSOR) X(two_state, TWO_STATE) X(battery_cell, BATTERY_CELL)
+    X(quadratic_sensor, QUADRATIC_SENSOR) X(two_state, TWO_STATE) X(battery_cell, BATTERY_CELL)            \
+    X(dc_motor, DC_MOTOR) X(battery_pack, BATTERY_PACK)
 
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_node name##_node;                                        \
