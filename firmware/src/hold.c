@@ -187,7 +187,7 @@ static const hg_real *moved_since(const hg_hold_config *config, uint8_t age)
     const hg_real *moved = config->span;
     if (age == 0U) {
         moved = config->half;
-    } else if (age <= horizon(config)) {
+    } else if ((width_of(config) > 0U) && (age <= horizon(config))) { /* a bare tick has no tables, and no place in one */
         moved = slew(config, age);
     } else {
         /* stale */

@@ -1,0 +1,35 @@
+# Fuzzing: each fuzz_NAME.c is one function that libFuzzer (clang-19) and AFL++ (clang-14) both drive, with AddressSanitizer and UBSan, against the numbered
+# invariants of INVARIANTS.md; readers.py does the same to the host's readers of files. corpus/ and regress/ are in hex. `make fuzz-quick` replays both
+# and fuzzes on for a few seconds, `make fuzz` for RUNTIME seconds a target and engine and adds what it did to ledger.toml.
+
+FUZZ := $(BUILD)/fuzz
+RUNTIME := 1200
+FUZZ_SECONDS := 15
+FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_ENGINES := libfuzzer afl
+FUZZ_SANITIZE := -O1 -g -fno-omit-frame-pointer -fno-sanitize-recover=all
+FUZZ_CC_libfuzzer = $(CLANG) $(FUZZ_SANITIZE) -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow
+FUZZ_LINK_libfuzzer = $(CLANG) -fsanitize=fuzzer,address,undefined,float-cast-overflow
+FUZZ_CC_afl = AFL_QUIET=1 AFL_USE_ASAN=1 AFL_USE_UBSAN=1 afl-clang-fast $(FUZZ_SANITIZE)
+FUZZ_LINK_afl = $(FUZZ_CC_afl) -fsanitize=fuzzer
+FUZZ_SRC := $(LIB_SRC) $(MODEL_SRC) firmware/apps/models.c
+
+# $(call fuzz_engine,ENGINE)
+define fuzz_engine
+$(eval $(call objects,$(FUZZ)/$(1),$(FUZZ_SRC) $(FUZZ_TARGETS:%=tests/fuzz/fuzz_%.c),$$(FUZZ_CC_$(1)) -Ifirmware/apps $(REAL_FLAG_f32)))
+$(eval $(call archive,$(FUZZ)/$(1)/libhullguard.a,$(FUZZ)/$(1),$(FUZZ_SRC)))
+$(FUZZ_TARGETS:%=$(FUZZ)/$(1)/%): $(FUZZ)/$(1)/%: $(FUZZ)/$(1)/tests/fuzz/fuzz_%.o $(FUZZ)/$(1)/libhullguard.a
+	$$(Q)$$(FUZZ_LINK_$(1)) -o $$@ $$^ -lm
+endef
+$(foreach e,$(FUZZ_ENGINES),$(eval $(call fuzz_engine,$(e))))
+
+fuzz_programs = $(foreach e,$(1),$(FUZZ_TARGETS:%=$(FUZZ)/$(e)/%))
+fuzz_run = $(PY) tests/fuzz/fuzz.py --build $(FUZZ) $(1) $(FUZZ_TARGETS)
+
+.PHONY: fuzz fuzz-quick
+CHECK_PARTS += fuzz-quick
+fuzz-quick: lib $(call fuzz_programs,libfuzzer) ## fuzzing, short: corpus and regressions of all targets, 15 s each, some thousand cases a reader of files
+	@$(call fuzz_run,quick --seconds $(FUZZ_SECONDS))
+DEEP_PARTS += fuzz
+fuzz: lib $(call fuzz_programs,$(FUZZ_ENGINES)) ## fuzzing, long: RUNTIME seconds a target and engine, 10^5 cases a reader; adds to tests/fuzz/ledger.toml
+	@$(call fuzz_run,long --seconds $(RUNTIME))
