@@ -1,0 +1,349 @@
+"""proofs.py [--deep] [NAME ..]: proofs by bounded model checking, tests/proofs/*.c; those whose file or function has one of the names in it, or all.
+
+A proof is a C function proof_X(), and what the comment before it says:
+
+    @proves FUNCTION ..     of the library; every public function must be in some proof, or in exceptions.txt with a reason
+    @run check|deep real=f32|f64|q31 unwind=N limit=SECONDS [loop:N ..] [NAME=NUMBER ..] [NAME ..]    once each; sizes are macros of the proof, HG_* of the library
+    @with CHECK ..          also this check of CBMC
+    @without CHECK: WHY     without it
+
+Everything else in the comment is for the reader: what is proven, for which sizes, under which assumptions. The library that is checked is the one of firmware/, with
+every subscript of an array checked besides (instrument.py). A run fails when an assertion can fail, a loop runs longer than it is unwound, or the time is over; and when
+it says nothing: no property, or a reach() that no input comes to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import resource
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from threading import Lock
+
+from instrument import InstrumentError, instrument, nodes, parse, text_of
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = ROOT / "tests/proofs"
+BUILD = ROOT / "build/proofs"
+RESULTS = ROOT / "build/results"
+TOOLS = ROOT / "build/tools/cbmc/bin"
+MEMORY = 8 << 30  # of one run, bytes
+
+CHECKS = ("bounds", "pointer", "pointer-overflow", "div-by-zero", "signed-overflow", "unsigned-overflow", "conversion", "undefined-shift")
+REACH = "reachable: "
+PROPERTY = re.compile(r"^\[([^\]]+)\] line \d+ (.*): (SUCCESS|FAILURE|UNKNOWN|ERROR)$", re.MULTILINE)
+TOTAL = re.compile(r"^\*\* (\d+) of (\d+) failed", re.MULTILINE)
+
+
+class ProofError(Exception):
+    """Something about a proof, not about the library, is wrong; one line says what."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the model checker."""
+
+    kind: str
+    real: str
+    unwind: int
+    limit: float
+    loops: tuple[str, ...]
+    defines: tuple[str, ...]
+
+    @property
+    def library(self) -> tuple[str, ...]:
+        """What the library is compiled with."""
+        return (f"HG_REAL_{self.real.upper()}=1", *(d for d in self.defines if d.startswith("HG_")))
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A function of tests/proofs/*.c and what its comment says."""
+
+    source: Path
+    name: str
+    says: str
+    proves: tuple[str, ...]
+    runs: tuple[Run, ...]
+    checks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one run."""
+
+    proof: Proof
+    run: Run
+    seconds: float
+    properties: int
+    asserted: int
+    problems: tuple[str, ...] = field(default=())
+
+    @property
+    def title(self) -> str:
+        """As it stands in the list."""
+        return " ".join((self.proof.name, self.run.real, *self.run.defines))
+
+
+def run_of(words: Sequence[str], where: str) -> Run:
+    """A line behind @run."""
+    known: dict[str, str] = {}
+    loops: list[str] = []
+    defines: list[str] = []
+    for word in words[1:]:
+        name, _, value = word.partition("=")
+        if name in ("real", "unwind", "limit"):
+            known[name] = value
+        elif ":" in word:
+            loops.append(word)
+        elif name.isupper() or name.startswith("HG_"):
+            defines.append(word if value else f"{name}=1")
+        else:
+            raise ProofError(f"{where}: @run does not know '{word}'")
+    if not words or words[0] not in ("check", "deep") or known.keys() != {"real", "unwind", "limit"} or known["real"] not in ("f32", "f64", "q31"):
+        raise ProofError(f"{where}: @run wants check or deep, real=, unwind= and limit=")
+    return Run(words[0], known["real"], int(known["unwind"]), float(known["limit"]), tuple(loops), tuple(defines))
+
+
+def proof_of(source: Path, name: str, comment: str) -> Proof:
+    """A proof by its comment."""
+    where = f"{source.name}: {name}"
+    lines = [re.sub(r"^\s*/?\*+/?\s?", "", line).removesuffix("*/").strip() for line in comment.splitlines()]
+    checks = list(CHECKS)
+    proves: list[str] = []
+    runs: list[Run] = []
+    for line in lines:
+        tag, _, rest = line.partition(" ")
+        if tag == "@proves":
+            proves += rest.split()
+        elif tag == "@run":
+            runs.append(run_of(rest.split(), where))
+        elif tag == "@with":
+            checks += rest.split()
+        elif tag == "@without":
+            names, colon, why = rest.partition(":")
+            if not colon or not why.strip() or any(n not in checks for n in names.split()):
+                raise ProofError(f"{where}: @without wants checks that there are, a colon and why")
+            checks = [c for c in checks if c not in names.split()]
+        elif tag.startswith("@"):
+            raise ProofError(f"{where}: no such word as {tag}")
+    says = " ".join(line for line in lines if line and not line.startswith("@"))
+    if not says or not proves or not runs:
+        raise ProofError(f"{where}: the comment wants a sentence of what is proven, @proves and @run")
+    return Proof(source, name, says, tuple(proves), tuple(runs), tuple(checks))
+
+
+def proofs_in(source: Path) -> list[Proof]:
+    """All proofs of a file; each must call what it says it proves, directly or by helpers of the file."""
+    root = parse(source).root_node
+    called: dict[str, set[str]] = {}
+    found: list[tuple[str, str]] = []
+    comment = ""
+    for node in root.children:
+        if node.type == "function_definition":
+            declarator = next(n for n in nodes(node) if n.type == "function_declarator").child_by_field_name("declarator")
+            assert declarator is not None
+            name = text_of(declarator)
+            called[name] = {text_of(n) for n in nodes(node) if n.type == "identifier"} - {name}
+            if name.startswith("proof_"):
+                found.append((name, comment))
+        comment = text_of(node) if node.type == "comment" else ""
+    proofs = [proof_of(source, name, says) for name, says in found]
+    for proof in proofs:
+        reached, waiting = set[str](), [proof.name]
+        while waiting:
+            new = called.get(waiting.pop(), set()) - reached
+            reached |= new
+            waiting += new
+        if idle := [f for f in proof.proves if f not in reached]:
+            raise ProofError(f"{source.name}: {proof.name} says it proves {', '.join(idle)} and does not call it")
+        if "reach" not in reached:
+            raise ProofError(f"{source.name}: {proof.name} has no reach(): nothing tells whether any input is left")
+    return proofs
+
+
+def public_functions() -> set[str]:
+    """Functions of the library's headers, declared or defined."""
+    found = set()
+    for header in sorted((ROOT / "firmware/include/hullguard").glob("*.h")):
+        for node in nodes(parse(header).root_node):
+            if node.type == "function_declarator" and (name := node.child_by_field_name("declarator")) is not None and text_of(name).startswith("hg_"):
+                found.add(text_of(name))
+    return found
+
+
+def exceptions() -> dict[str, str]:
+    """Public functions without a proof, and why."""
+    lines = (line.partition(":") for line in (HERE / "exceptions.txt").read_text().splitlines() if line and not line.startswith("#"))
+    return {name.strip(): why.strip() for name, _, why in lines}
+
+
+def check_coverage(proofs: Iterable[Proof]) -> int:
+    """Every public function is proven or excepted, and nothing else is. Returns how many are proven."""
+    public, proven, excepted = public_functions(), {f for p in proofs for f in p.proves}, exceptions()
+    for name in sorted(public):
+        if name not in proven and not excepted.get(name):
+            raise ProofError(f"{name}() is public and has no proof: write one, or a line with a reason in tests/proofs/exceptions.txt")
+        if name in proven and name in excepted:
+            raise ProofError(f"{name}() has a proof: take its line out of tests/proofs/exceptions.txt")
+    if strangers := (proven | excepted.keys()) - public:
+        raise ProofError(f"no public function has this name: {', '.join(sorted(strangers))}")
+    return len(proven)
+
+
+def compile_goto(sources: Sequence[Path], output: Path, defines: Sequence[str], link: bool = False) -> None:
+    """Compile to CBMC's form, unless that is newer than all sources."""
+    inputs = [*sources, HERE / "proof.h", *(BUILD / "source").rglob("*.h"), *(ROOT / "firmware/models").glob("*.h"), *HERE.glob("*.h")]
+    if output.exists() and all(s.stat().st_mtime <= output.stat().st_mtime for s in inputs):
+        return
+    output.parent.mkdir(parents=True, exist_ok=True)
+    include = [f"-I{BUILD / 'source/firmware/include'}", f"-I{ROOT / 'firmware/models'}", f"-I{HERE}", "-include", str(HERE / "proof.h")]
+    what = [] if link else ["-c", "-std=c11", *include, *(f"-D{d}" for d in defines)]
+    partial = output.with_suffix(".part")
+    done = subprocess.run([TOOLS / "goto-cc", *what, "-o", partial, *sources], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise ProofError(f"{output.name} does not compile:\n{done.stdout}{done.stderr}")
+    partial.rename(output)
+
+
+_compiling = Lock()
+
+
+@cache
+def library_of(defines: tuple[str, ...]) -> tuple[Path, ...]:
+    """The instrumented library for one set of options."""
+    folder = BUILD / "library" / "-".join(d.replace("=", "") for d in defines)
+    objects = []
+    for source in sorted((BUILD / "source/firmware/src").glob("*.c")):
+        objects.append(folder / f"{source.stem}.o")
+        compile_goto([source], objects[-1], defines)
+    return tuple(objects)
+
+
+def command_of(proof: Proof, run: Run) -> list[str]:
+    """What proves it; compiles what that needs."""
+    folder = BUILD / "run" / "-".join((proof.source.stem, run.real, *(d.replace("=", "") for d in run.defines)))
+    with _compiling:
+        objects = library_of(run.library)
+        compile_goto([proof.source], folder / "proof.o", (*run.library, *(d for d in run.defines if not d.startswith("HG_"))))
+        compile_goto([folder / "proof.o", *objects], folder / "all.goto", (), link=True)
+    flags = [f"--{check}-check" for check in proof.checks]
+    loops = [f"--unwindset={','.join(run.loops)}"] if run.loops else []
+    return [
+        str(TOOLS / "cbmc"), str(folder / "all.goto"), "--function", proof.name, "--no-standard-checks", "--unwinding-assertions", "--no-malloc-may-fail",
+        "--drop-unused-functions", "--slice-formula", "--object-bits", "10", "--unwind", str(run.unwind), *loops, *flags,
+    ]  # fmt: skip
+
+
+def judge(output: str) -> tuple[int, int, list[str]]:
+    """Properties, those among them that the proof states itself, and what is wrong."""
+    properties = PROPERTY.findall(output)
+    total = TOTAL.search(output)
+    problems = []
+    if total is None or int(total[2]) != len(properties):
+        return 0, 0, ["its output cannot be read: " + (output.strip().splitlines() or ["nothing"])[-1]]
+    reaches = [status for _, text, status in properties if text.startswith(REACH)]
+    checked = [(name, text, status) for name, text, status in properties if not text.startswith(REACH)]
+    problems += [f"no input comes to it, the assumptions contradict one another: {text}" for _, text, status in properties if text.startswith(REACH) and status != "FAILURE"]
+    problems += [f"{status}: {name}: {text}" for name, text, status in checked if status != "SUCCESS"]
+    if not reaches or not checked:
+        problems.append("it states nothing")
+    return len(checked), sum(".assertion." in name for name, _, _ in checked), problems
+
+
+def prove(proof: Proof, run: Run) -> Outcome:
+    """Run it."""
+    command = command_of(proof, run)
+    begin = time.monotonic()
+
+    def limit_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=run.limit, preexec_fn=limit_memory)  # noqa: PLW1509
+        properties, asserted, problems = judge(done.stdout if PROPERTY.search(done.stdout) else done.stdout + done.stderr)
+    except subprocess.TimeoutExpired:
+        properties, asserted, problems = 0, 0, [f"not decided in {run.limit:g} s"]
+    if problems:
+        problems.append("see for yourself: " + shlex.join(os.path.relpath(w, ROOT) if w.startswith("/") else w for w in command) + " --trace")
+    return Outcome(proof, run, time.monotonic() - begin, properties, asserted, tuple(problems))
+
+
+def report(outcome: Outcome) -> None:
+    """One line; what is wrong below it."""
+    print(f"  {'FAILED' if outcome.problems else 'ok'}  {outcome.title}: {outcome.properties} properties, {outcome.seconds:.1f} s", flush=True)
+    for problem in outcome.problems:
+        print(f"      {problem}", flush=True)
+
+
+def write_results(gate: str, proven: int, outcomes: Sequence[Outcome]) -> None:
+    """build/results/GATE.json."""
+    sources = sorted({o.proof.source for o in outcomes})
+    promises = [{
+        "promise": "No undefined behaviour, no overrun of an array and no endless loop in any public function of the library, for all inputs that its header allows, at the stated sizes",
+        "result": f"{proven} of {len(public_functions())} public functions, {len(outcomes)} runs of {len({o.proof for o in outcomes})} proofs in {len(sources)} files, "
+        f"{sum(o.properties for o in outcomes)} properties proven",
+    }]  # fmt: skip
+    for proof in dict.fromkeys(o.proof for o in outcomes):
+        own = [o for o in outcomes if o.proof is proof]
+        sizes = "; ".join(" ".join((o.run.real, *o.run.defines)) for o in own)
+        promises.append({"promise": proof.says, "result": f"{proof.name} ({proof.source.name}): {sum(o.properties for o in own)} properties; {sizes}"})
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    (RESULTS / f"{gate}.json").write_text(json.dumps({"gate": gate, "command": f"make {gate}", "promises": promises}, indent=2, ensure_ascii=False) + "\n")
+
+
+def prepare() -> int:
+    """The checked copy of the library. Returns its subscripts."""
+    count = 0
+    for source in sorted((ROOT / "firmware").glob("src/*.c")) + sorted((ROOT / "firmware").glob("include/hullguard/*.h")):
+        count += instrument(source, BUILD / "source" / source.relative_to(ROOT))
+    return count
+
+
+def main() -> int:
+    """As the module says."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--deep", action="store_true", help="the runs that take long")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="runs at a time")
+    parser.add_argument("--list", action="store_true", help="only list the proofs")
+    parser.add_argument("names", nargs="*", help="parts of names of files or proofs")
+    options = parser.parse_args()
+    kind = "deep" if options.deep else "check"
+    try:
+        every = [p for source in sorted(HERE.glob("*.c")) for p in proofs_in(source)]
+        chosen = [(p, r) for p in every for r in p.runs if r.kind == kind and (not options.names or any(n in f"{p.source.stem} {p.name}" for n in options.names))]
+        if options.list:
+            print("\n".join(f"{p.source.stem}: {p.name}: {p.says}" for p in dict.fromkeys(p for p, _ in chosen)))
+            return 0
+        if not chosen:
+            raise ProofError(f"no proof has one of these in its name: {' '.join(options.names)}")
+        proven = 0 if options.names else check_coverage(every)
+        subscripts = prepare()
+        chosen.sort(key=lambda pair: -pair[1].limit)
+        with ThreadPoolExecutor(options.jobs) as pool:
+            outcomes = []
+            for future in [pool.submit(prove, p, r) for p, r in chosen]:
+                outcomes.append(future.result())
+                report(outcomes[-1])
+    except (ProofError, InstrumentError) as error:
+        print(f"proofs: {error}", file=sys.stderr)
+        return 2
+    failed = [o for o in outcomes if o.problems]
+    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} proven, {sum(o.properties for o in outcomes)} properties; {subscripts} subscripts instrumented")
+    if not options.names and not failed:
+        write_results("proofs-deep" if options.deep else "proofs", proven, sorted(outcomes, key=lambda o: every.index(o.proof)))
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
