@@ -41,6 +41,7 @@ TOOLS = ROOT / "build/tools/cbmc/bin"
 MEMORY = 8 << 30  # of one run, bytes
 
 CHECKS = ("bounds", "pointer", "pointer-overflow", "div-by-zero", "signed-overflow", "unsigned-overflow", "conversion", "undefined-shift")
+SHOWN = 8  # of what is wrong with one run
 REACH = "reachable: "
 PROPERTY = re.compile(r"^\[([^\]]+)\] line \d+ (.*): (SUCCESS|FAILURE|UNKNOWN|ERROR)$", re.MULTILINE)
 TOTAL = re.compile(r"^\*\* (\d+) of (\d+) failed", re.MULTILINE)
@@ -149,16 +150,15 @@ def proofs_in(source: Path) -> list[Proof]:
     root = parse(source).root_node
     called: dict[str, set[str]] = {}
     found: list[tuple[str, str]] = []
-    comment = ""
-    for node in root.children:
+    for node in nodes(root):
         if node.type == "function_definition":
             declarator = next(n for n in nodes(node) if n.type == "function_declarator").child_by_field_name("declarator")
             assert declarator is not None
             name = text_of(declarator)
             called[name] = {text_of(n) for n in nodes(node) if n.type == "identifier"} - {name}
             if name.startswith("proof_"):
-                found.append((name, comment))
-        comment = text_of(node) if node.type == "comment" else ""
+                before = node.prev_sibling
+                found.append((name, text_of(before) if before is not None and before.type == "comment" else ""))
     proofs = [proof_of(source, name, says) for name, says in found]
     for proof in proofs:
         reached, waiting = set[str](), [proof.name]
@@ -239,7 +239,7 @@ def command_of(proof: Proof, run: Run) -> list[str]:
         compile_goto([proof.source], folder / "proof.o", (*run.library, *(d for d in run.defines if not d.startswith("HG_"))))
         compile_goto([folder / "proof.o", *objects], folder / "all.goto", (), link=True)
     flags = [f"--{check}-check" for check in proof.checks]
-    loops = [f"--unwindset={','.join(run.loops)}"] if run.loops else []
+    loops = ["--unwindset", ",".join(run.loops)] if run.loops else []
     return [
         str(TOOLS / "cbmc"), str(folder / "all.goto"), "--function", proof.name, "--no-standard-checks", "--unwinding-assertions", "--no-malloc-may-fail",
         "--drop-unused-functions", "--slice-formula", "--object-bits", "10", "--unwind", str(run.unwind), *loops, *flags,
@@ -256,7 +256,10 @@ def judge(output: str) -> tuple[int, int, list[str]]:
     reaches = [status for _, text, status in properties if text.startswith(REACH)]
     checked = [(name, text, status) for name, text, status in properties if not text.startswith(REACH)]
     problems += [f"no input comes to it, the assumptions contradict one another: {text}" for _, text, status in properties if text.startswith(REACH) and status != "FAILURE"]
-    problems += [f"{status}: {name}: {text}" for name, text, status in checked if status != "SUCCESS"]
+    wrong = [f"{status}: {name}: {text}" for name, text, status in checked if status not in ("SUCCESS", "UNKNOWN")]
+    # Behind what is undefined everything is unknown.
+    wrong = wrong or [f"{status}: {name}: {text}" for name, text, status in checked if status != "SUCCESS"]
+    problems += wrong[:SHOWN] + ([f"and {len(wrong) - SHOWN} more"] if len(wrong) > SHOWN else [])
     if not reaches or not checked:
         problems.append("it states nothing")
     return len(checked), sum(".assertion." in name for name, _, _ in checked), problems

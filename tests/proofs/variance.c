@@ -7,7 +7,7 @@
 /** The running sums are those of the samples in the window, exactly, and the sensor is silent only with a full window that scatters no more than the level.
  *  Any window up to WINDOW, SAMPLES samples of any codes, with and without trend.
  *  @proves hg_variance_start hg_variance_step
- *  @run check real=f32 unwind=8 limit=60 WINDOW=3U SAMPLES=5U */
+ *  @run check real=f32 unwind=8 limit=30 WINDOW=3U SAMPLES=5U */
 void proof_variance_sums(void)
 {
     int16_t memory[WINDOW];
@@ -46,7 +46,7 @@ void proof_variance_sums(void)
 /** No sum overflows in the largest window: of sums that WINDOW samples of 16 bits can have, the next step's arithmetic stays within 64 bits.
  *  Any sums with |S1| <= W 2^15, 0 <= S2 <= W 2^30, S1^2 <= W S2, |T1| <= W (W - 1) 2^14 and |2 T1 - (W - 1) S1| <= W^2 2^14, which the samples' own have, before and after.
  *  @proves hg_variance_step
- *  @run check real=f32 unwind=4 limit=60 WINDOW=255 */
+ *  @run check real=f32 unwind=4 limit=30 WINDOW=255 */
 void proof_variance_range(void)
 {
     int16_t memory[WINDOW];
