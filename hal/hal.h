@@ -28,7 +28,7 @@
 
 /** Error state of the controller, by the fault confinement of ISO 11898-1. Memory that was never written is not a healthy bus. */
 typedef enum {
-    HG_BUS_UNKNOWN = 0,
+    HG_BUS_UNKNOWN = 0,   /* nothing has been asked yet */
     HG_BUS_ACTIVE  = 1,   /* both error counters below 96 */
     HG_BUS_WARNING = 2,   /* one of them 96 .. 127 */
     HG_BUS_PASSIVE = 3,   /* one of them 128 or more */
@@ -60,10 +60,11 @@ typedef struct {
     hg_status (*send)(void *self, const hg_can_frame *frame);
     hg_status (*receive)(void *self, hg_can_frame *frame, uint64_t *time_us);
     void      (*state)(void *self, hg_hal_report *out);
-    uint64_t  (*now_us)(void *self);
+    uint64_t  (*now_us)(void *self); /* as hg_hal_now_us(); so are the others as their wrappers */
     hg_status (*wait)(void *self, uint64_t until_us);
 } hg_hal_ops;
 
+/** A board. */
 typedef struct {
     const hg_hal_ops *ops;
     void             *self;   /* the backend's object; whoever started it owns it and keeps it alive */

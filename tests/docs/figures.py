@@ -59,7 +59,7 @@ def said(command: str) -> str:
 
 def cases(command: str) -> list[dict[str, Any]]:
     """The cases of a campaign."""
-    result = json.loads(said(f"{command} --json -q"))
+    result = json.loads(said(f"{command} --json -q --workers 1"))
     return list(result.get("cases") or [result])
 
 

@@ -6,7 +6,7 @@ grammar of C; conditions of the preprocessor are taken out before, so that every
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import tree_sitter_c
@@ -39,6 +39,7 @@ class Item:
     members: tuple[Member, ...] = ()
     condition: str = ""  # of the preprocessor, for what not every build has
     result: str = ""  # type that a function returns
+    follows: bool = False  # stands under the declaration before it, without a blank line
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ class _Reading:
     """A file on its way through."""
 
     source: bytes
-    lines: list[str]
+    raw: list[str]  # lines of the file
+    lines: list[str]  # the same without conditions
     conditions: list[str]  # [lines]
     comments: list[_Comment] = field(default_factory=list)
 
@@ -82,6 +84,20 @@ def headers() -> list[Header]:
     return [first, *(read(LIBRARY / Path(name).name) for name in first.includes), *(read(BOARD / name) for name in ("hal.h", "bare.h"))]
 
 
+def groups(header: Header) -> list[list[Item]]:
+    """What a header declares, its guard left out. Macros or types on lines that follow one another share the comment of the first."""
+    found: list[list[Item]] = []
+    for item in header.items:
+        if item.kind == "macro" and item.name.startswith("HULLGUARD_") and item.name.endswith("_H"):
+            continue
+        last = found[-1][-1] if found else None
+        if last and not item.text and item.kind == last.kind in ("macro", "type") and item.follows and item.condition == last.condition:
+            found[-1].append(item)
+        else:
+            found.append([item])
+    return found
+
+
 def read(path: Path) -> Header:
     """One header."""
     return parse(path, path.read_text())
@@ -89,8 +105,9 @@ def read(path: Path) -> Header:
 
 def parse(path: Path, text: str) -> Header:
     """A header's text."""
-    lines, conditions = _flat(text.split("\n"))
-    reading = _Reading("\n".join(lines).encode(), lines, conditions)
+    raw = text.split("\n")
+    lines, conditions = _flat(raw)
+    reading = _Reading("\n".join(lines).encode(), raw, lines, conditions)
     root = Parser(Language(tree_sitter_c.language())).parse(reading.source).root_node
     if root.has_error:
         raise ValueError(f"{path}: not C as this reader knows it; see tests/docs/headers.py")
@@ -161,8 +178,11 @@ def _dedent(text: str) -> str:
 
 def _before(reading: _Reading, row: int) -> str:
     """The comment that ends on the line above, unless that stands behind something else."""
+    above = row - 1
+    while above > 0 and reading.raw[above].startswith("#if"):  # the condition of what follows
+        above -= 1
     for comment in reading.comments:
-        if comment.last == row - 1 and not comment.taken and reading.lines[comment.first].lstrip().startswith("/*") and not _heading(comment.text):
+        if comment.last == above and not comment.taken and reading.lines[comment.first].lstrip().startswith("/*") and not _heading(comment.text):
             comment.taken = True
             return comment.text
     return ""
@@ -191,9 +211,17 @@ def _note(comment: _Comment) -> Item | None:
 # ---- declarations ----
 
 
+def _follows(reading: _Reading, row: int) -> bool:
+    """Is there nothing but conditions between this line and a declaration above?"""
+    above = row - 1
+    while above > 0 and re.match(r"#(if|endif)", reading.raw[above]):
+        above -= 1
+    return reading.raw[above].startswith(("#define", "typedef"))
+
+
 def _item(reading: _Reading, node: Node) -> list[Item]:
     make = {"preproc_def": _macro, "preproc_function_def": _macro, "type_definition": _type, "declaration": _function, "function_definition": _function}.get(node.type)
-    return [make(reading, node)] if make else []
+    return [replace(make(reading, node), follows=_follows(reading, node.start_point.row))] if make else []
 
 
 def _place(reading: _Reading, node: Node) -> tuple[int, str]:

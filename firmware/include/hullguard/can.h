@@ -12,7 +12,7 @@ extern "C" {
 #define HG_CAN_DATA_MAX 64U          /* bytes; CAN FD */
 #define HG_CAN_CLASSIC_MAX 8U        /* bytes; classic CAN */
 #define HG_CAN_ID_STANDARD 0x7FFUL   /* largest 11-bit identifier */
-#define HG_CAN_ID_EXTENDED 0x1FFFFFFFUL
+#define HG_CAN_ID_EXTENDED 0x1FFFFFFFUL /* largest 29-bit identifier */
 
 #define HG_CAN_EXTENDED 0x01U        /* 29-bit identifier */
 #define HG_CAN_REMOTE 0x02U          /* remote request: carries no data */
@@ -24,7 +24,7 @@ typedef struct {
     uint32_t id;                     /* 11 or 29 bits, without flag bits */
     uint8_t  flags;                  /* HG_CAN_* */
     uint8_t  length;                 /* bytes of data[], 0 .. HG_CAN_DATA_MAX */
-    uint8_t  data[HG_CAN_DATA_MAX];
+    uint8_t  data[HG_CAN_DATA_MAX];  /* in the order on the bus */
 } hg_can_frame;
 
 #ifdef __cplusplus

@@ -14,10 +14,10 @@
 #define HG_REAL_F64 0
 #endif
 #ifndef HG_REAL_Q31
-#define HG_REAL_Q31 0
+#define HG_REAL_Q31 0 /* fixed point */
 #endif
 #ifndef HG_REAL_F32
-#define HG_REAL_F32 (1 - HG_REAL_F64 - HG_REAL_Q31)
+#define HG_REAL_F32 (1 - HG_REAL_F64 - HG_REAL_Q31) /* what the others leave */
 #endif
 #if (HG_REAL_F32 + HG_REAL_F64 + HG_REAL_Q31) != 1
 #error "choose exactly one number type: HG_REAL_F32, HG_REAL_F64 or HG_REAL_Q31"
@@ -28,13 +28,13 @@
 #define HG_WITH_ZONOTOPE (1 - HG_REAL_Q31) /* its columns have no range that could be proven in fixed point */
 #endif
 #ifndef HG_WITH_BANK
-#define HG_WITH_BANK 1
+#define HG_WITH_BANK 1 /* bank.h */
 #endif
 #ifndef HG_WITH_PREDICT
-#define HG_WITH_PREDICT 1
+#define HG_WITH_PREDICT 1 /* predict.h */
 #endif
 #ifndef HG_WITH_MISMATCH
-#define HG_WITH_MISMATCH 1
+#define HG_WITH_MISMATCH 1 /* mismatch.h */
 #endif
 #ifndef HG_WITH_MODES
 #define HG_WITH_MODES 1 /* of a hull (hull.h) */
@@ -96,7 +96,7 @@
 #define HG_ONLY_HISTORY 0U /* rows of the ring of radii */
 #endif
 #ifndef HG_ONLY_GENERATORS
-#define HG_ONLY_GENERATORS 0U
+#define HG_ONLY_GENERATORS 0U /* residual generators */
 #endif
 #ifndef HG_ONLY_JUDGED
 #define HG_ONLY_JUDGED 0U /* generators and banks */

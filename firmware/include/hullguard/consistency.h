@@ -41,8 +41,8 @@ typedef struct {            /* flash */
 } hg_consistency_config;
 
 typedef struct {            /* RAM: one a hypothesis */
-    hg_real d;
-    hg_real c;
+    hg_real d;              /* the sums above, since the hypothesis began */
+    hg_real c;              /* without a fault the variance of d */
 } hg_consistency_sum;
 
 typedef struct {            /* RAM: one a sensor */

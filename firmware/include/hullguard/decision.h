@@ -29,7 +29,7 @@ typedef enum {
 
 /* What a verdict rests on. */
 typedef enum {
-    HG_BASIS_UNSET       = 0,
+    HG_BASIS_UNSET       = 0, /* no verdict yet */
     HG_BASIS_SET         = 1, /* bounds: no false alarm while they hold */
     HG_BASIS_STATISTICAL = 2  /* probabilities: a stated rate of false alarms */
 } hg_basis;

@@ -54,20 +54,21 @@ extern "C" {
 #define HG_E2E_IGNORE_STAMP 0x04U    /* book to the open sample whatever the stamp says */
 #define HG_E2E_IGNORE_STATE 0x08U    /* use good frames in state INVALID too */
 
+/* Profile of a message: the table above has each one's checksum, counter and data identifier. */
 typedef enum {
     HG_E2E_NONE = 1, /* no protection: every frame is good, a loss shows by its age only */
-    HG_E2E_P01  = 2,
-    HG_E2E_P02  = 3,
-    HG_E2E_P05  = 4,
-    HG_E2E_P11  = 5,
-    HG_E2E_P22  = 6
+    HG_E2E_P01  = 2, /* AUTOSAR E2E profile 01 */
+    HG_E2E_P02  = 3, /* profile 02 */
+    HG_E2E_P05  = 4, /* profile 05 */
+    HG_E2E_P11  = 5, /* profile 11 */
+    HG_E2E_P22  = 6  /* profile 22 */
 } hg_e2e_profile;
 
-typedef enum { /* P01, P11; P11 of the standard knows both and nibble only */
-    HG_E2E_BOTH      = 1,
-    HG_E2E_ALTERNATE = 2,
-    HG_E2E_LOW       = 3,
-    HG_E2E_NIBBLE    = 4
+typedef enum { /* which bytes of the data identifier go into the sum of P01 and P11; P11 of the standard knows both and nibble only */
+    HG_E2E_BOTH      = 1, /* low, then high */
+    HG_E2E_ALTERNATE = 2, /* low with an even counter, high with an odd one */
+    HG_E2E_LOW       = 3, /* low */
+    HG_E2E_NIBBLE    = 4  /* low, then 0; the low nibble of the high byte is in the frame */
 } hg_e2e_id_mode;
 
 typedef struct {    /* one state's way out */
@@ -162,7 +163,7 @@ typedef enum {
     HG_E2E_DEINIT  = 0, /* not started */
     HG_E2E_NODATA  = 1, /* no good frame yet */
     HG_E2E_INIT    = 2, /* some; not yet enough */
-    HG_E2E_VALID   = 3,
+    HG_E2E_VALID   = 3, /* what comes may be used */
     HG_E2E_INVALID = 4  /* too many damaged frames, or no good one for long: what comes is not to be used */
 } hg_e2e_state;
 

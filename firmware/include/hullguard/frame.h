@@ -46,7 +46,7 @@ typedef struct {          /* flash: one a signal in a frame */
 } hg_field;
 
 typedef struct {                   /* flash: one a message */
-    uint32_t             id;
+    uint32_t             id;       /* 11 or 29 bits, without flag bits */
     uint8_t              flags;    /* HG_CAN_EXTENDED, HG_CAN_FD, HG_CAN_BRS */
     uint8_t              length;   /* bytes */
     uint8_t              width;    /* signals, 0 .. HG_GROUP_SIGNALS_MAX */

@@ -93,7 +93,7 @@ typedef struct {                  /* flash: generated; shared by all nodes */
 /* What is known of a sensor in one sample. */
 typedef enum {
     HG_FUSION_NOTHING = 1, /* no frame: silence or a loss */
-    HG_FUSION_VALUE   = 2,
+    HG_FUSION_VALUE   = 2, /* a frame with a value */
     HG_FUSION_SILENT  = 3, /* the sensor has said so */
     HG_FUSION_LOST    = 4  /* it spoke, and the frame is gone */
 } hg_fusion_known;
@@ -123,7 +123,7 @@ typedef struct {         /* RAM: one a sensor; counters saturate */
     uint16_t frames;     /* fused or excluded in time */
     uint16_t lost;       /* by the counter */
     uint16_t late;       /* filtered in after `delay`, or too late for that */
-    uint16_t repeated;
+    uint16_t repeated;   /* a second value of one sample */
     uint16_t refused;    /* not finite or out of range */
     uint8_t  counter;    /* of the last frame */
     uint8_t  age;        /* samples since its last frame, as of the sample after the one closed last */
@@ -174,7 +174,7 @@ typedef struct {                    /* RAM: one a node */
     uint8_t                 newest; /* place of sample k among the slots */
     uint8_t                 held;   /* samples held, 0 .. depth + 1 */
     uint8_t                 redo;   /* samples back from which on the next close filters again */
-    bool                    open;
+    bool                    open;   /* is sample k open? */
 } hg_fusion;
 
 /** Are sizes and tables within the ranges above? Cost: n^2 + tables rates m comparisons. */

@@ -30,7 +30,7 @@ extern "C" {
 /* Health of one group's link. 0 is not a good state. */
 typedef enum {
     HG_BUS_ABSENT = 0, /* no good frame yet */
-    HG_BUS_GOOD   = 1,
+    HG_BUS_GOOD   = 1, /* nothing is known to be lost */
     HG_BUS_LOSSY  = 2, /* a frame was lost and two good ones in a row have not been seen since */
     HG_BUS_STALE  = 3  /* no good frame for longer than interval_max + margin */
 } hg_bus_health;

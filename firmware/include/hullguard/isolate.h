@@ -47,9 +47,9 @@ extern "C" {
 typedef enum {
     HG_CAUSE_UNDECIDED = 0, /* a fault shows, and the window is not full yet */
     HG_CAUSE_INPUT     = 1, /* no fault shows: what moves the plant is its unknown inputs */
-    HG_CAUSE_ACTUATOR  = 2,
-    HG_CAUSE_COMPONENT = 3,
-    HG_CAUSE_SENSOR    = 4,
+    HG_CAUSE_ACTUATOR  = 2, /* a force that its command does not explain */
+    HG_CAUSE_COMPONENT = 3, /* a part that has become weaker or stiffer */
+    HG_CAUSE_SENSOR    = 4, /* a reading that is wrong */
     HG_CAUSE_AMBIGUOUS = 5  /* more than one candidate, or more than one fault */
 } hg_cause;
 

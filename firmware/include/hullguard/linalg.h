@@ -10,9 +10,10 @@
 extern "C" {
 #endif
 
+/* A constant matrix. */
 typedef struct {
-    uint8_t        rows;
-    uint8_t        cols;
+    uint8_t        rows;     /* 0 .. 255 */
+    uint8_t        cols;     /* 0 .. 255 */
     int8_t         exponent; /* the matrix is data * 2^exponent; hg_exponent_valid() */
     const hg_real *data;     /* rows x cols, row-major */
 } hg_matrix;
@@ -28,12 +29,13 @@ void hg_linalg_apply(const hg_matrix *m, const hg_real *x, const hg_matrix *n, c
 
 /* Rows that are summed side by side share what is read of the vector: four where that many sums find room in registers. */
 typedef struct {
-    hg_acc a;
-    hg_acc b;
-    hg_acc c;
-    hg_acc d;
+    hg_acc a; /* of the first row */
+    hg_acc b; /* the second */
+    hg_acc c; /* the third */
+    hg_acc d; /* the fourth */
 } hg_linalg_sums;
 
+/* Four empty sums. */
 static inline hg_linalg_sums hg_linalg_no_sums(void)
 {
     hg_linalg_sums none;
@@ -44,6 +46,7 @@ static inline hg_linalg_sums hg_linalg_no_sums(void)
     return none;
 }
 
+/* Four rows of a table, the first at `row`, times x [cols]: added to four sums. */
 static inline void hg_linalg_add_four(hg_linalg_sums *sum, const hg_real *row, const hg_real *x, uint8_t cols)
 {
     const hg_real *a = row;
@@ -58,6 +61,7 @@ static inline void hg_linalg_add_four(hg_linalg_sums *sum, const hg_real *row, c
     }
 }
 
+/* The same for two rows and the first two sums. */
 static inline void hg_linalg_add_two(hg_linalg_sums *sum, const hg_real *row, const hg_real *x, uint8_t cols)
 {
     const hg_real *b = &row[cols];
@@ -67,6 +71,7 @@ static inline void hg_linalg_add_two(hg_linalg_sums *sum, const hg_real *row, co
     }
 }
 
+/* The same for one row: the sum with it. */
 static inline hg_acc hg_linalg_add_one(hg_acc sum, const hg_real *row, const hg_real *x, uint8_t cols)
 {
     hg_acc total = sum;

@@ -70,7 +70,7 @@ typedef struct {                       /* flash: one a model, generated */
     const hg_message         *verdict;    /* 8 bytes, or 12 for more than 16 faults; no fields: the map stands in frame.h; P22 */
     const hg_message         *status;     /* 8 bytes, no fields; P22 */
     uint16_t                  heartbeat;  /* samples between heartbeats, >= 1 */
-    uint32_t                  model_hash;
+    uint32_t                  model_hash; /* of the model that the tables are of; the status frame carries it */
 } hg_node_config;
 
 typedef struct {            /* what happened on one group's link since the start; every counter saturates */
@@ -97,7 +97,7 @@ typedef struct {            /* RAM: one a group */
 
 typedef struct {            /* the record that the verdict frame carries */
     uint32_t   k;           /* sample it speaks of */
-    uint32_t   model_hash;
+    uint32_t   model_hash;  /* of the node's tables */
     uint32_t   candidates;  /* bit i: fault i of the model can explain the alarm */
     hg_plant   plant;
     hg_basis   basis;
@@ -129,8 +129,8 @@ typedef struct {                /* RAM: one a node */
     bool            reported;   /* has a verdict frame been handed out? */
     uint16_t        silence;    /* samples since the last heartbeat */
     hg_verdict      last;       /* the last one of those */
-    uint8_t         verdict_counter;
-    uint8_t         status_counter;
+    uint8_t         verdict_counter; /* of the next verdict frame */
+    uint8_t         status_counter;  /* of the next status frame */
 } hg_node;
 
 typedef struct {                /* owned by the caller; one storage type a model is generated */

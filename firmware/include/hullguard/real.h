@@ -36,12 +36,13 @@ extern "C" {
 #endif
 
 #if HG_REAL_Q31
+/* A number, and a sum of products, as the table above says. */
 typedef int32_t hg_real;
 typedef int64_t hg_acc;
 /* deviation: misra-c2012-10.8: a constant is scaled and cut in one expression, because tables are initialised with it */
 /* cppcheck-suppress-macro misra-c2012-10.8 */
 #define HG_REAL_C(x) (((x) >= 1.0) ? INT32_MAX : (int32_t)((x) * 2147483648.0)) /* 1 and above: infinity */
-#define HG_REAL_MAX (INT32_MAX - 1)
+#define HG_REAL_MAX (INT32_MAX - 1) /* the largest finite number */
 #elif HG_REAL_F64
 typedef double hg_real;
 typedef hg_real hg_acc;
@@ -57,7 +58,7 @@ typedef hg_real hg_acc;
 #endif
 
 #if HG_REAL_Q31
-#define HG_REAL_ZERO 0
+#define HG_REAL_ZERO 0 /* the number 0 */
 
 /* x / 2^places, rounded; 0 <= places <= 62, |x| + half of 2^places < 2^63. */
 static inline int64_t hg_q31_shift(int64_t x, uint8_t places)
@@ -68,6 +69,7 @@ static inline int64_t hg_q31_shift(int64_t x, uint8_t places)
     return (x < 0) ? -(int64_t)magnitude : (int64_t)magnitude;
 }
 
+/* The nearest number of the type: what does not fit becomes an infinity. */
 static inline hg_real hg_q31_saturate(int64_t x)
 {
     int64_t held = (x > (int64_t)INT32_MAX) ? (int64_t)INT32_MAX : x;

@@ -8,8 +8,9 @@
 extern "C" {
 #endif
 
+/* What a call answers. */
 typedef enum {
-    HG_OK           = 1,
+    HG_OK           = 1,   /* done, as the function says */
     HG_E_ARGUMENT   = -1,  /* a null pointer or a number outside the stated range, at start */
     HG_E_SIZE       = -2,  /* the memory handed over is smaller than the configuration needs */
     HG_E_CONFIG     = -3,  /* constant tables contradict each other, or their checksum is wrong */

@@ -52,7 +52,7 @@ typedef struct {                     /* flash: one a model, generated */
     const hg_message            *estimate;    /* [states] two fields each: state and its standard deviation */
     uint16_t                     heartbeat;   /* samples between two status frames, >= 1 */
     uint16_t                     interval;    /* samples between two estimates, >= 1 */
-    uint32_t                     model_hash;
+    uint32_t                     model_hash;  /* of the model that the tables are of */
 } hg_tracker_config;
 
 typedef struct {                     /* owned by the caller; one storage type a model is generated */
@@ -79,16 +79,16 @@ typedef struct {                     /* RAM: one a node */
     bool            synchronised;    /* has a tick told which sample is open? */
     bool            judging;         /* has the consistency test begun to judge? */
     bool            slipped;         /* the last tick was late */
-    uint8_t         slipped_counter;
-    uint8_t         slipped_stamp;
+    uint8_t         slipped_counter; /* its sequence counter */
+    uint8_t         slipped_stamp;   /* and its stamp */
     uint8_t         ahead_max;       /* samples that a tick can be ahead */
     bool            reported;        /* has a verdict frame been handed out? */
     uint16_t        silence;         /* samples since the last status frame */
     uint16_t        unsaid;          /* samples since the last estimate */
     hg_verdict      last;
-    uint8_t         verdict_counter;
-    uint8_t         status_counter;
-    uint8_t         estimate_counter;
+    uint8_t         verdict_counter; /* of the next verdict frame */
+    uint8_t         status_counter;  /* of the next status frame */
+    uint8_t         estimate_counter; /* of the next estimate */
 } hg_tracker;
 
 /** Begin: sample 0 is open until a tick says otherwise.
@@ -139,7 +139,7 @@ hg_status hg_tracker_estimate(hg_tracker *self, uint8_t j, hg_can_frame *frame);
 /** FNV-1a over all that must be equal in nodes of one number type and byte order: prediction, covariance and origin of the newest sample that no frame in time can change.
  *  @param[in] digest  of the samples before; HG_TRACKER_DIGEST for none */
 uint32_t hg_tracker_digest(const hg_fusion *fusion, uint32_t digest);
-#define HG_TRACKER_DIGEST 0x811C9DC5U
+#define HG_TRACKER_DIGEST 0x811C9DC5U /* where a digest begins */
 
 /** Health of a sensor's link; `sensors`: of the tick's. */
 const hg_link_health *hg_tracker_health(const hg_tracker *self, uint8_t i);
@@ -148,7 +148,7 @@ const hg_link_health *hg_tracker_health(const hg_tracker *self, uint8_t i);
 
 typedef struct {            /* RAM: one a sensor of this node */
     const hg_tracker *tracker; /* the node's own copy */
-    uint8_t           sensor;
+    uint8_t           sensor;  /* 0 .. sensors - 1 */
     uint8_t           counter; /* of the next frame: it counts those that were to be sent, so that receivers see what was lost */
 } hg_fusion_sender;
 

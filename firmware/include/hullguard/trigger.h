@@ -36,7 +36,7 @@ typedef struct {                /* flash: one a group, generated; shared by send
 typedef struct {                /* RAM: one a sender */
     const hg_trigger_config *config;
     int32_t                 *sent;     /* [width] codes of the last frame */
-    uint8_t                  level;
+    uint8_t                  level;    /* in use since that frame, 0 .. levels - 1 */
     uint8_t                  age;      /* samples since the last frame */
     bool                     started;  /* has a frame been sent? */
 } hg_trigger;

@@ -103,7 +103,10 @@ void hg_uio_reset(hg_uio *self, hg_start how);
 hg_status hg_uio_step(hg_uio *self, const hg_real *value, const hg_ring *ring, hg_real *estimate, hg_real *radius);
 
 /** The sample that a detector has just closed. Started when the detector was; where the detector has begun again since, so does this, as in a moving
- *  plant, before the step. @param[out] estimate, radius  as hg_uio_step(), whose status and cost it has */
+ *  plant, before the step.
+ *  @param[out] estimate, radius  as hg_uio_step(), whose cost it has
+ *  @retval HG_OK         done
+ *  @retval HG_E_NUMERIC  as hg_uio_step() */
 hg_status hg_uio_follow(hg_uio *self, const hg_detector *detector, hg_real *estimate, hg_real *radius);
 
 /** Has the initial state become a small part of the radii? */

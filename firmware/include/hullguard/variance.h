@@ -29,11 +29,11 @@ typedef struct {         /* flash */
 typedef struct {         /* RAM */
     const hg_variance_config *config;
     int16_t                  *y;      /* [window] ring */
-    int64_t                   S1;
-    int64_t                   S2;
-    int64_t                   T1;
+    int64_t                   S1;     /* the sums above */
+    int64_t                   S2;     /* of squares */
+    int64_t                   T1;     /* about the line */
     uint8_t                   oldest; /* place of the oldest sample once the window is full */
-    uint8_t                   held;
+    uint8_t                   held;   /* samples in the window, 0 .. window */
 } hg_variance;
 
 /** Begin with an empty window.

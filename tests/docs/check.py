@@ -1,0 +1,119 @@
+"""What is wrong with the documentation: declarations that nothing explains, statuses that are not in the closed list, links that lead nowhere."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from html.parser import HTMLParser
+from pathlib import Path
+
+from headers import ROOT, Header, Item, Member, groups
+
+EXPLAINED = ("struct", "enum", "function", "macro", "type")
+RETVAL = re.compile(r"@retval (\w+)")
+
+
+def complaints(headers: Sequence[Header], site: Path) -> list[str]:
+    """A line each."""
+    return [*unexplained(headers), *unknown_statuses(headers), *broken_links(site)]
+
+
+def facts(headers: Sequence[Header], site: Path) -> list[dict[str, str]]:
+    """What holds when there is no complaint, with how much was looked at."""
+    every = [item for h in headers for group in groups(h) for item in group]
+    count = {kind: sum(i.kind == kind for i in every) for kind in EXPLAINED}
+    members = sum(len(i.members) for i in every)
+    links = sum(len(_Page(p).links) for p in site.rglob("*.html"))
+    return [
+        {
+            "promise": "Every public function, type, macro, field and enum member of the library and of hal/ has words that say what it is.",
+            "result": f"{len(headers)} headers: {count['function']} functions, {count['struct']} structs, {count['enum']} enums, {members} members, {count['macro']} macros",
+        },
+        {
+            "promise": "Every status that a function names is one of the closed list, and every function that returns a status names those it returns.",
+            "result": f"{sum(len(RETVAL.findall(i.text)) for i in every)} statuses of {sum(i.result == 'hg_status' for i in every)} functions",
+        },
+        {"promise": "Every relative link and anchor of the markdown pages and of the generated ones leads somewhere.", "result": f"{links} links in {len(list(site.rglob('*.html')))} pages"},
+    ]
+
+
+# ---- words ----
+
+
+def unexplained(headers: Sequence[Header]) -> list[str]:
+    """Declarations without a word. What has several variants may be explained at one of them, a struct by its fields, and a field by its type, where that is a struct or an enum of the library."""
+    types = {i.name for h in headers for i in h.items if i.kind in ("struct", "enum")}
+    wrong = []
+    for h in headers:
+        said = {i.name for group in groups(h) for i in group if group[0].text}
+        for group in groups(h):
+            item = group[0]
+            if item.kind in EXPLAINED and not item.text and item.name not in said and not _by_members(item):
+                wrong.append(f"{h.path.relative_to(ROOT)}:{item.line}: nothing says what {item.name} is")
+            wrong += [f"{h.path.relative_to(ROOT)}:{m.line}: nothing says what {item.name}.{m.name} is" for m in item.members if not m.text and not _by_type(item, m, types)]
+    return wrong
+
+
+def _by_members(item: Item) -> bool:
+    return item.kind == "struct" and bool(item.members) and all(m.text for m in item.members)
+
+
+def _by_type(item: Item, member: Member, types: set[str]) -> bool:
+    return item.kind == "struct" and bool(set(re.findall(r"\w+", member.code)) & types)
+
+
+def unknown_statuses(headers: Sequence[Header]) -> list[str]:
+    """Results of functions, held against hg_status."""
+    known = {m.name for h in headers for i in h.items if i.name == "hg_status" for m in i.members}
+    wrong = []
+    for h in headers:
+        for item in (i for i in h.items if i.kind == "function"):
+            named = set(RETVAL.findall(item.text))
+            place = f"{h.path.relative_to(ROOT)}:{item.line}"
+            wrong += [f"{place}: {item.name} names {name}, which is no hg_status" for name in sorted(named - known)]
+            if item.result == "hg_status" and not named:
+                wrong.append(f"{place}: {item.name} returns a status and names none (@retval)")
+    return wrong
+
+
+# ---- links ----
+
+
+class _Page(HTMLParser):
+    """Anchors and links of a page."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.feed(path.read_text())
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """One tag."""
+        for name, value in attrs:
+            if name == "id" and value:
+                if value in self.anchors:
+                    self.links.append(f"#twice:{value}")
+                self.anchors.add(value)
+            elif name in ("href", "src") and value:
+                self.links.append(value)
+
+
+def broken_links(site: Path) -> list[str]:
+    """Relative links of all pages of the site; it has every markdown file of the tree, with its links as they are there."""
+    pages = {p.resolve(): _Page(p) for p in sorted(site.rglob("*.html"))}
+    return [f"{path.relative_to(site.resolve())}: {why}" for path, page in pages.items() for link in page.links for why in _broken(path, link, pages)]
+
+
+def _broken(path: Path, link: str, pages: dict[Path, _Page]) -> Iterator[str]:
+    if link.startswith("#twice:"):
+        yield f"the anchor {link.removeprefix('#twice:')} stands there twice"
+        return
+    if re.match(r"[a-z]+:", link):
+        return
+    name, _, anchor = link.partition("#")
+    to = (path.parent / name).resolve() if name else path
+    if not to.exists():
+        yield f"{link} leads nowhere"
+    elif anchor and to in pages and anchor not in pages[to].anchors:
+        yield f"{link}: no such anchor"
