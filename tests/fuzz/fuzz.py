@@ -5,7 +5,8 @@
     fuzz.py pack TARGET ..                    a small corpus from what the long runs found: corpus/TARGET.hex
     fuzz.py keep TARGET FILE NAME             an input that broke an invariant becomes a regression: regress/TARGET.hex
 
-Inputs are in hex, one a line behind its name, so that a difference can be read."""
+Inputs are in hex, one a line behind its name, so that a difference can be read.
+"""
 
 import argparse
 import json
@@ -48,8 +49,9 @@ def write_ledger(ledger: dict[tuple[str, str], Entry]) -> None:
     """Sorted, so that a difference shows what was added."""
     lines = ["# Executions so far of each fuzz target and reader, findings among them, and those still open. Written by tests/fuzz/fuzz.py.\n"]
     for (target, engine), entry in sorted(ledger.items()):
-        lines.append(f'[[run]]\ntarget = "{target}"\nengine = "{engine}"\nexecutions = {entry.executions}\nseconds = {entry.seconds}\n'
-                     f"findings = {entry.findings}\nopen = {entry.open}\n")
+        lines.append(
+            f'[[run]]\ntarget = "{target}"\nengine = "{engine}"\nexecutions = {entry.executions}\nseconds = {entry.seconds}\nfindings = {entry.findings}\nopen = {entry.open}\n'
+        )
     LEDGER.write_text("\n".join(lines))
 
 
@@ -112,8 +114,19 @@ def lib_fuzzer(target: str, build: Path, seconds: int, seed: int, keep: bool) ->
     shutil.rmtree(artefacts, ignore_errors=True)
     artefacts.mkdir(parents=True)
     log = work / target / "libfuzzer.log"
-    command = [str(build / "libfuzzer" / target), f"-max_total_time={seconds}", f"-max_len={LONGEST.get(target, 512)}", "-len_control=20", "-timeout=30", "-rss_limit_mb=1500",
-               "-print_final_stats=1", f"-seed={seed}", f"-artifact_prefix={artefacts}/", str(grown), *map(str, folders)]
+    command = [
+        str(build / "libfuzzer" / target),
+        f"-max_total_time={seconds}",
+        f"-max_len={LONGEST.get(target, 512)}",
+        "-len_control=20",
+        "-timeout=30",
+        "-rss_limit_mb=1500",
+        "-print_final_stats=1",
+        f"-seed={seed}",
+        f"-artifact_prefix={artefacts}/",
+        str(grown),
+        *map(str, folders),
+    ]
     with log.open("w") as out:
         code = subprocess.run(command, stdout=out, stderr=subprocess.STDOUT, check=False).returncode
     text = log.read_text(errors="replace")
@@ -186,11 +199,19 @@ def write_results(build: Path, targets: list[str]) -> None:
         inputs = sum(len(read_hex(HERE / kind / f"{target}.hex")) for kind in ("regress", "corpus"))
         executed = sum(entry.executions for (name, _), entry in ledger.items() if name == target)
         still = sum(entry.open for (name, _), entry in ledger.items() if name == target)
-        promises.append({"promise": f"no input breaks an invariant of the fuzz target {target} (tests/fuzz/INVARIANTS.md)",
-                         "result": f"{inputs} inputs of corpus and regressions; {executed} executions in the ledger, {still} findings open"})
+        promises.append(
+            {
+                "promise": f"no input breaks an invariant of the fuzz target {target} (tests/fuzz/INVARIANTS.md)",
+                "result": f"{inputs} inputs of corpus and regressions; {executed} executions in the ledger, {still} findings open",
+            }
+        )
     cases = [(name, entry) for (name, engine), entry in sorted(ledger.items()) if engine == "readers"]
-    promises.append({"promise": "a file that is wrong in any way is refused in one line by the host's readers, in bounded time and memory",
-                     "result": f"{len(cases)} readers, {sum(entry.executions for _, entry in cases)} cases in the ledger, {sum(entry.open for _, entry in cases)} findings open"})
+    promises.append(
+        {
+            "promise": "a file that is wrong in any way is refused in one line by the host's readers, in bounded time and memory",
+            "result": f"{len(cases)} readers, {sum(entry.executions for _, entry in cases)} cases in the ledger, {sum(entry.open for _, entry in cases)} findings open",
+        }
+    )
     folder = build.parent / "results"
     folder.mkdir(exist_ok=True)
     (folder / "fuzz-quick.json").write_text(json.dumps({"gate": "fuzz-quick", "command": "make fuzz-quick", "promises": promises}, indent=1) + "\n")

@@ -17,6 +17,7 @@ from hullguard.bus import candump, lean, mf4, pcap
 from hullguard.bus.candump import ERROR, REMOTE, Entry
 from hullguard.bus.link import from_message, to_message
 from hullguard.errors import InputError
+from hullguard.files import is_file
 
 FIRST_DATE_S = 631152000.0  # 1990: BLF and ASC keep the date of their first frame, and take an earlier one for none
 
@@ -137,7 +138,7 @@ def of(path: Path) -> Format:
 def read(path: Path) -> Iterator[Entry]:
     """The frames of a file, in its order."""
     made = of(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such file")
     try:
         yield from made.read(path)

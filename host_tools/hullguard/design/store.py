@@ -122,7 +122,7 @@ def opened(path: Path, version: int) -> Table | None:
         return None
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, OSError) as error:
         raise InputError(f"{path.name}: not a readable design file ({error}); run hullguard design again") from error
     top = Table(data, path.name)
     return top if top.whole("version", 0, 10_000) == version else None
@@ -159,7 +159,7 @@ def read(path: Path) -> Stored | None:
         t.close()
     A = plant.matrix("A")
     inputs = plant.raw("B")
-    B = plant.matrix("B", A.shape[0]) if inputs and inputs[0] else np.zeros((A.shape[0], 0))
+    B = plant.matrix("B", A.shape[0]) if not isinstance(inputs, list) or (inputs and inputs[0]) else np.zeros((A.shape[0], 0))
     reach = signals.vector("reach")
     stored = Stored(
         model_sha256=top.text("model_sha256"),

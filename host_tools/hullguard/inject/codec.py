@@ -23,7 +23,7 @@ from hullguard.core.protect import Protector
 from hullguard.design.design import Design
 from hullguard.design.protection import NONE, check_protection
 from hullguard.errors import InputError
-from hullguard.model.network import protection
+from hullguard.model.network import protection, too_large
 
 FLOATS = {16: ("<e", 0x7E00), 32: ("<f", 0x7FC00000), 64: ("<d", 0x7FF8000000000000)}  # bits: format, quiet NaN
 KIND = EXTENDED | REMOTE | FD | ERROR
@@ -262,10 +262,13 @@ def _fields(message: Any) -> dict[str, Field]:
 
 def codec_of(text: str, source: str, closing: str | None = None) -> Codec:
     """The codec of a DBC's text; `closing` names the message that ends a sample."""
+    wrong = too_large(text)
+    if wrong:
+        raise InputError(f"{source}: a length or a place that no frame has, at '{wrong}'; correct the database")
     try:
         database: Any = cantools.database.load_string(text, "dbc")
     except Exception as error:  # cantools lets errors of several parsers through
-        raise InputError(f"{source}: not a DBC that can be read ({str(error).splitlines()[0]})") from error
+        raise InputError(f"{source}: not a DBC that can be read ({' '.join(str(error).split()) or type(error).__name__})") from error
     layouts = []
     for m in database.messages:
         flags = (EXTENDED if m.is_extended_frame else 0) | (FD if m.is_fd else 0)

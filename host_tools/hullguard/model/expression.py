@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hullguard.errors import InputError
+from hullguard.model.table import LARGEST
 
 CONSTANT, VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, NEGATE = range(8)
 FUNCTIONS = ("sin", "cos", "tan", "atan", "exp", "log", "sqrt", "tanh")  # operations from FIRST on
@@ -44,10 +45,14 @@ def compiled(text: str, names: Sequence[str], parameters: dict[str, float], wher
         tree = ast.parse(text, mode="eval")
     except (SyntaxError, ValueError) as error:
         raise InputError(f"{where}: '{text}' is no expression ({error})") from error
+    except (RecursionError, MemoryError) as error:
+        raise _too_deep(where) from error
     code: list[tuple[int, int]] = []
     constants: list[float] = []
 
     def constant(value: float) -> None:
+        if abs(value) > LARGEST:  # an integer of any size, or what 1e999 is read as
+            raise InputError(f"{where}: a number beyond {LARGEST:g}; choose other units")
         code.append((CONSTANT, len(constants)))
         constants.append(float(value))
 
@@ -72,10 +77,17 @@ def compiled(text: str, names: Sequence[str], parameters: dict[str, float], wher
             known = ", ".join([*names, *parameters])
             raise InputError(f"{where}: '{ast.unparse(node)}' is none of + - * / **, numbers, {', '.join(FUNCTIONS)} and {known}")
 
-    walk(tree.body)
+    try:
+        walk(tree.body)
+    except RecursionError as error:
+        raise _too_deep(where) from error
     if _depth(code) > DEPTH_MAX:
-        raise InputError(f"{where}: nested more deeply than {DEPTH_MAX}; write it as a sum of simpler terms")
+        raise _too_deep(where)
     return Program(tuple(code), tuple(constants))
+
+
+def _too_deep(where: str) -> InputError:
+    return InputError(f"{where}: nested more deeply than {DEPTH_MAX}; write it as a sum of simpler terms")
 
 
 def of_terms(terms: Sequence[tuple[float, Sequence[int]]]) -> Program:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hullguard.design.protection import LISTED, MODAL, MODES, NIBBLE, NO_STAMP, NONE, PROFILES, UNPROTECTED, ProtectionTable, check_protection, own_protection
 from hullguard.errors import InputError
+from hullguard.files import is_file
 from hullguard.model.table import Table
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 SAME = 1e-9  # relative: two numbers that a person wrote as the same
 UNSIGNED_MAX, SIGNED_MAX, FLOAT_BITS = 31, 32, 32
+LENGTH_MAX = 1785  # bytes: of a message that a transport protocol (J1939) carries in many frames
+_PLACE = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(-?\d+)|:\s*(-?\d+)\s*\|\s*(-?\d+)\s*@")
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 CLASSIC_MAX = 8
 
@@ -112,6 +115,14 @@ def adopt(data: dict[str, Any], where: str, folder: Path) -> Network:
     return Network(tuple(wires), {(m.frame_id, m.is_extended_frame): m.name for m in database.messages})
 
 
+def too_large(text: str) -> str:
+    """The first place or length in a DBC's text that no frame has, empty for none: cantools would lay it out bit by bit until the memory is full."""
+    for found in _PLACE.finditer(text):
+        if any(not 0 <= int(n[:12]) <= most for n, most in zip(found.groups("0"), (LENGTH_MAX, 8 * LENGTH_MAX, 8 * LENGTH_MAX), strict=True)):
+            return " ".join(found[0].split())
+    return ""
+
+
 def load(network: Table, folder: Path) -> Any:
     """The database that [network] names, a path relative to the model file."""
     import cantools
@@ -119,9 +130,12 @@ def load(network: Table, folder: Path) -> Any:
 
     name = network.text("dbc")
     path = folder / name
-    if not path.is_file():
+    if not is_file(path):
         raise network.error("dbc", f"no file '{name}' beside the model")
     try:
+        wrong = too_large(path.read_text(encoding="cp1252", errors="replace"))
+        if wrong:
+            raise network.error("dbc", f"'{name}' has a length or a place that no frame has, at '{wrong}'; correct the database")
         # Not strict: what is wrong with messages that the model does not use is no business of its.
         return cantools.database.load_file(path, database_format="dbc", strict=False)
     except (Error, UnsupportedDatabaseFormatError, UnicodeDecodeError, ValueError, KeyError) as error:

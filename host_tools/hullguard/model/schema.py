@@ -15,6 +15,7 @@ import numpy as np
 
 from hullguard.design.protection import MODAL, MODES, NIBBLE_ID_MAX, NONE, PROFILES
 from hullguard.errors import InputError
+from hullguard.files import is_file
 from hullguard.model import polynomial
 from hullguard.model.builders_car import TYRE
 from hullguard.model.choice import read_orders, read_parity, read_poles
@@ -267,32 +268,34 @@ class Model:
 def find_model(name: str) -> Path:
     """The file behind a shipped model's name, or behind a path."""
     path = Path(name)
-    if path.suffix == ".toml" or path.exists():
-        if not path.is_file():
-            raise InputError(f"model '{name}': no such file")
+    if is_file(path):
         return path
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise InputError(f"model '{name}': no such file")
     shipped = SHIPPED / f"{name}.toml"
-    if not shipped.is_file():
+    if not is_file(shipped):
         known = sorted(p.stem for p in SHIPPED.glob("*.toml") if not p.stem.endswith(".design"))
         raise InputError(f"model '{name}': neither a file nor a shipped model ({', '.join(known)})")
     return shipped
 
 
-def _read_file(path: Path) -> dict[str, Any]:
-    """A model file's data, over that of the model it is based on."""
+def _read_file(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """A model file's data, over that of the model it is based on; `above`: the files that are based on this one."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{path.name}: not valid TOML: {error}") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     if "base" not in data:
         return data
     base = data.pop("base")
-    if not isinstance(base, str) or not (path.parent / base).is_file():
+    if not isinstance(base, str) or not is_file(path.parent / base):
         raise InputError(f"{path.name}.base: expected the name of a model file beside this one, found {base!r}")
-    beneath = _read_file(path.parent / base) if (path.parent / base) != path else {}
-    return _over(data, beneath)
+    beneath = (path.parent / base).resolve()
+    if beneath in (*above, path.resolve()):
+        raise InputError(f"{path.name}.base: '{base}' is in the end based on this file; remove one of the two")
+    return _over(data, _read_file(beneath, (*above, path.resolve())))
 
 
 def source(path: Path) -> dict[str, Any]:
@@ -354,7 +357,7 @@ def parse_override(text: str) -> tuple[str, Any]:
         raise InputError(f"--set '{text}': expected KEY=VALUE, for example groups.measurement.trigger.silence=1")
     try:
         parsed = tomllib.loads(f"v = {value}")["v"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         parsed = value.strip()
     return key.strip(), parsed
 

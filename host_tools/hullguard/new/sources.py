@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import tomllib
-import zipfile
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.errors import InputError
+from hullguard.files import is_file
 from hullguard.model.table import Array
 
 KEYS = ("A", "B", "C", "D")
@@ -36,12 +38,12 @@ def read_file(path: Path) -> StateSpace:
     readers = {".mat": _mat, ".npz": _npz, ".json": _json, ".csv": _csv}
     if path.suffix.lower() not in readers:
         raise InputError(f"--from {path}: expected {', '.join(readers)}")
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"--from {path}: no such file")
     try:
         found = readers[path.suffix.lower()](path)
-    except (OSError, ValueError, TypeError, KeyError, IndexError, csv.Error, zipfile.BadZipFile) as error:
-        raise InputError(f"--from {path}: cannot be read as {path.suffix} ({str(error).splitlines()[0]})") from error
+    except Exception as error:  # what SciPy, NumPy and zlib raise for a damaged file is of any class
+        raise InputError(f"--from {path}: cannot be read as {path.suffix} ({' '.join(str(error).split()) or type(error).__name__})") from error
     return state_space(found, str(path.name))
 
 
@@ -66,13 +68,16 @@ def state_space(found: dict[str, Any], where: str) -> StateSpace:
     time = next((found[k] for k in TIMES if k in found), None)
     if time is None:
         return StateSpace(A, B, C, D, None, False)
-    value = np.asarray(time).ravel()
+    try:
+        value = np.asarray(time).ravel()
+    except ValueError:  # a list of lists of any lengths
+        value = np.asarray(["none"])
     # python-control: None says nothing, True is discrete without a time, 0 continuous.
     if value.dtype in (bool, object):
         return StateSpace(A, B, C, D, None, bool(value.dtype == bool and value.size and value[0]))
-    if value.size != 1 or not np.isfinite(float(value[0])):
-        raise InputError(f"{where}: the sample time is no number: {time}")
-    seconds = float(value[0])
+    seconds = float(value[0]) if value.size == 1 and value.dtype.kind in "fiu" else np.nan
+    if not np.isfinite(seconds):
+        raise InputError(f"{where}: the sample time is no number: {' '.join(str(time).split())}")
     # Matlab gives -1 to a discrete system whose sample time is not known.
     return StateSpace(A, B, C, D, seconds if seconds > 0.0 else None, seconds != 0.0)
 
@@ -83,7 +88,7 @@ def _matrix(value: Any, key: str, where: str) -> Array:
         if np.iscomplexobj(made):
             raise ValueError("complex")
         made = made.astype(np.float64)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{where}: {key} is no matrix of real numbers ({error})") from error
     if made.ndim != 2 or not np.all(np.isfinite(made)):
         raise InputError(f"{where}: {key} is no matrix of finite numbers")
@@ -98,21 +103,29 @@ def _matrix_text(key: str, text: str) -> list[list[float]]:
             rows = made if made and isinstance(made[0], list) else [made]
             return [[float(x) for x in row] for row in rows]
         rows = [[float(x) for x in row.replace(",", " ").split()] for row in text.split(";") if row.strip()]
-    except (ValueError, TypeError, IndexError) as error:
+    except (ValueError, TypeError, IndexError, OverflowError, RecursionError) as error:
         raise InputError(f"--{key} '{text}': expected rows of numbers, \"0.9 0.1; 0 0.8\"") from error
     if not rows or any(len(r) != len(rows[0]) for r in rows):
         raise InputError(f"--{key} '{text}': its rows differ in length")
     return rows
 
 
-def _mat(path: Path) -> dict[str, Any]:
+def _loaded(path: Path) -> dict[str, Any]:
     import scipy.io
 
     try:
-        found = scipy.io.loadmat(path)
+        return {k: v for k, v in scipy.io.loadmat(path).items() if not k.startswith("__")}
     except NotImplementedError as error:
         raise ValueError("version 7.3 is HDF5; save it with -v7") from error
-    held = {k: v for k, v in found.items() if not k.startswith("__")}
+
+
+def _mat(path: Path) -> dict[str, Any]:
+    # In a process of its own: on some damaged files SciPy's reader dies of a segmentation fault.
+    with ProcessPoolExecutor(1) as apart:
+        try:
+            held = apart.submit(_loaded, path).result()
+        except BrokenProcessPool as error:
+            raise ValueError("damaged: its reader broke off") from error
     if "A" in held:
         return held
     structs = [v for v in held.values() if isinstance(v, np.ndarray) and v.dtype.names and "A" in v.dtype.names and v.size == 1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -147,7 +148,7 @@ class _Json:
 
     def number(self, key: str) -> float:
         value = self.raw(key)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= sys.float_info.max:
             raise InputError(f"{self.where}: '{key}' is {value!r}, expected a finite number")
         return float(value)
 
@@ -356,6 +357,8 @@ def read_run(directory: Path) -> Run:
         top = _Json(json.loads(_text(path)), str(path))
     except json.JSONDecodeError as error:
         raise InputError(f"{path}: not valid JSON: {error.msg} in line {error.lineno}") from error
+    except RecursionError as error:
+        raise InputError(f"{path}: not the JSON of a run: nested too deeply") from error
     where = directory / "signals.csv"
     column = read_csv(where)
     labels = _labels(directory / "labels.csv")
