@@ -10,7 +10,8 @@
 #define JOIN(a, b, c) JOIN_OF(a, b, c)
 
 /* The tables are part of the proof, so that every layout is a constant. */
-#include TEXT(MODEL.c)
+#define SOURCE TEXT(MODEL.c)
+#include SOURCE
 
 /** Every measurement and control message of the model is valid, and every code that its senders can send comes out of the frame as it went in, protection and stamp beside it.
  *  All messages of the model, any codes, counter and stamp.

@@ -25,7 +25,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import ceil
 from pathlib import Path
@@ -78,6 +78,7 @@ class Proof:
     proves: tuple[str, ...]
     runs: tuple[Run, ...]
     checks: tuple[str, ...]
+    others: tuple[str, ...] = ()  # sizes of all proofs of the file: 1 where a run does not name them
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,8 @@ def proofs_in(source: Path) -> list[Proof]:
                 before = node.prev_sibling
                 found.append((name, text_of(before) if before is not None and before.type == "comment" else ""))
     proofs = [proof_of(source, name, says) for name, says in found]
+    sizes = {d.partition("=")[0] for p in proofs for r in p.runs for d in r.defines if re.fullmatch(r"[A-Z]+=\d+U?", d)}
+    proofs = [replace(p, others=tuple(sorted(sizes))) for p in proofs]
     for proof in proofs:
         reached, waiting = set[str](), [proof.name]
         while waiting:
@@ -236,7 +239,9 @@ def command_of(proof: Proof, run: Run) -> list[str]:
     folder = BUILD / "run" / "-".join((proof.source.stem, run.real, *(d.replace("=", "") for d in run.defines)))
     with _compiling:
         objects = library_of(run.library)
-        compile_goto([proof.source], folder / "proof.o", (*run.library, *(d for d in run.defines if not d.startswith("HG_"))))
+        own = [d for d in run.defines if not d.startswith("HG_")]
+        ones = [f"{size}=1U" for size in proof.others if not any(d.startswith(f"{size}=") for d in own)]
+        compile_goto([proof.source], folder / "proof.o", (*run.library, *own, *ones))
         compile_goto([folder / "proof.o", *objects], folder / "all.goto", (), link=True)
     flags = [f"--{check}-check" for check in proof.checks]
     loops = ["--unwindset", ",".join(run.loops)] if run.loops else []
