@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from dyadic import Exact, exact
 from hullguard.design.design import Design
+from hullguard.model.table import Array
 
 STEPS = 1 << 20  # of a disturbance, from nothing to its bound
 
@@ -48,6 +49,9 @@ class Healthy:
         self._reference = np.zeros(plant.p)
         groups = self.made.model.groups
         self._table = {i: g.signals[n] for g, spec in zip(self.made.tables.groups, groups, strict=True) for n, i in enumerate(spec.signals)}
+        # A declared slew holds for the noise of the sensor as well, which this plant has on the signal's way into the plant.
+        self._moved = np.array([(s.slew[0] - 2 * s.noise) if s.slew else np.inf for s in (self.made.model.signals[i] for i in self.made.model.inputs)])
+        self._last: Array | None = None
         self._as_sent = {i for g in groups if g.applied_as_sent for i in g.signals}
 
     def _signs(self, count: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -66,7 +70,10 @@ class Healthy:
             wanted = plant.equilibrium_input - plant.feedback.gain @ moved + plant.feedback.reference_bound * self._reference
         else:
             wanted = 0.1 * self._reference * np.array([min(-model.signals[i].low, model.signals[i].high) for i in model.inputs])
-        return exact([self._sent(i, float(u)) for i, u in zip(model.inputs, wanted, strict=True)])
+        near = wanted if self._last is None else np.clip(wanted, self._last - self._moved, self._last + self._moved)
+        sent = np.array([self._sent(i, float(u)) for i, u in zip(model.inputs, near, strict=True)])
+        self._last = sent
+        return exact(sent)
 
     def _sent(self, signal: int, value: float) -> float:
         table = self._table[signal]

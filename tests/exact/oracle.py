@@ -2,8 +2,8 @@
 
     |true - value| <= radius              of every signal of a group whose losses are known, also of the samples before that a gap has rewritten
     |r_exact - r| <= rounding of r        r_exact from the tables and the values that the library has, in rational numbers
-    J >= J_exact                          the hull of these tables over the radii that the library has: disturbances and initial states as they are,
-                                          the plant as it is; no tail, no rounding. And J no more above it than the design says it may be.
+    J >= J_exact + |r_exact - r|          the hull of these tables over the radii that the library has: disturbances and initial states as they are,
+                                          the plant as it is; no tail. And J no more above it than the design says it may be.
 
 For the proof of a bound from below numbers are cut, never rounded up: to 2^-PLACES.
 """
@@ -54,6 +54,7 @@ class Reader:
 
     def __init__(self, node: Node, native: Native) -> None:
         self._d, self._ffi, self._t, self._q31 = node.node.detector, native.library.ffi, native.tables, native.library.real == "q31"
+        self._seen: dict[int, bytes] = {}
 
     def _exact(self, pointer: Any, count: int, first: int) -> Exact:
         numbers = self._ffi.unpack(pointer, count)
@@ -65,11 +66,16 @@ class Reader:
     def value(self) -> Exact:
         return self._exact(self._d.value, self._t.width, 0)
 
-    def radius(self, lag: int = 0) -> Exact:
-        """Of the ring, `lag` samples ago."""
-        ring = self._d.radii
-        row = (ring.newest - lag) % ring.length
-        return self._exact(ring.data + row * ring.width, ring.width, 0)
+    def radii(self, lags: int) -> list[tuple[int, Exact]]:
+        """Rows of the ring that are not as they were at the last call, as (lag, row): the newest, and what a gap has rewritten."""
+        ring, found = self._d.radii, []
+        for lag in range(lags):
+            row = (ring.newest - lag) % ring.length
+            raw = bytes(self._ffi.buffer(ring.data + row * ring.width, ring.width * self._ffi.sizeof("hg_real")))
+            if lag == 0 or self._seen.get(row) != raw:
+                found.append((lag, self._exact(ring.data + row * ring.width, ring.width, 0)))
+            self._seen[row] = raw
+        return found
 
     def r(self) -> Exact:
         return self._exact(self._d.r, self._t.residuals, self._t.width)
@@ -245,18 +251,18 @@ class Run:
 
     def _check(self, k: int, links: Links, shows: bool) -> None:
         self._values.append(self._read.value())
-        self._radii.append(self._read.radius())
-        back = min(k, self._native.tables.history - 1)
-        if shows:
-            for lag in range(back + 1):
-                self._radii[k - lag] = self._read.radius(lag)
-        for lag in range(back + 1 if shows else 1):
+        self._radii.append(self._values[k])
+        lags = min(k + 1, self._native.tables.history)
+        changed = self._read.radii(lags)
+        for lag, row in changed:
+            self._radii[k - lag] = row
+        for lag in range(lags) if shows else [lag for lag, _ in changed]:
             self._held(k - lag, links)
         r, J = self._read.r(), self._read.J()
         for i, residual in enumerate(self._residuals):
             found, bound = residual.step(self._values[k])
             self._rounded(k, i, r, found, bound)
-            self._threshold(k, i, J)
+            self._threshold(k, i, J, abs(r[self._first[i] : self._first[i] + len(bound)] - found))
 
     def _held(self, k: int, links: Links) -> None:
         """|true - value| <= radius."""
@@ -288,11 +294,11 @@ class Run:
                 raise Broken(f"sample {k}, generator {i + 1}, residual {n + 1}: rounding has moved it by {float(off):.3g}, more than {bound[n]:.3g}")
             self.worst.rounding = max(self.worst.rounding, float(off) / float(bound[n]) if off else 0.0)
 
-    def _threshold(self, k: int, i: int, J: Exact) -> None:
+    def _threshold(self, k: int, i: int, J: Exact, moved: Exact) -> None:
         exactly = self._hulls[i]
         if exactly is None:
             return
-        least = exactly.at(self._radii)
+        least = exactly.at(self._radii) + moved
         own = J[self._first[i] : self._first[i] + least.whole.shape[0]]
         widest = np.max([np.max((x.floats() / self._usual)[list(self.made.generators[i].signal)]) for x in self._radii])
         allowed = exactly.slack(k, np.array([widest]), own.floats(), self.real)
