@@ -23,7 +23,7 @@ from hullguard.model.table import Array
 from world import Choice, World
 
 ROUNDS = 5  # programmes a start, until nothing grows
-INSIDE = 1 - 1e-9  # of the bounds: more than the programme and doubles are off
+INSIDE = 0.999  # of declared slews and ranges: the programme knows nothing of the rounding of inputs that are applied as sent
 REST_REFERENCE = Reference("rest", 0.0, 1)
 
 
@@ -35,6 +35,7 @@ class Found:
     provisional: int = 0
     confirmed: int = 0
     runs: int = 0
+    outside: int = 0  # of them not counted: the plant left a declared slew or range
 
     @property
     def largest(self) -> float:
@@ -72,7 +73,6 @@ class Search:
     samples: int
     seed: int
     loss: float = 0.0
-    plants: bool = False  # others inside the intervals, at every sample
     found: Found = field(init=False)
 
     def __post_init__(self) -> None:
@@ -83,6 +83,7 @@ class Search:
         self._moves = self._world.moves()
         self._half = np.array([s.resolution / 2 for s in self.made.model.signals])
         self._group = np.array([i for i, g in enumerate(self.made.model.groups) for _ in g.signals])
+        self._pattern = 0
         self.aims = self._aims()
         self.found = Found(np.zeros(self.made.tables.residuals + sum(t.estimates for t in self._tables)))
 
@@ -103,9 +104,8 @@ class Search:
     def run(self, choice: Choice) -> Traced:
         """Through senders, bus and detector."""
         reading, state = self._world.run(choice)
-        run = self.found.runs
         batch = Batch(self._native, self.made, self.samples, REST_REFERENCE, seed=self.seed, loss=self.loss, burst=3 if self.loss else 0, start=self.start, series=reading)
-        trace, result = batch.trace(run), batch.runs(run, 1)[0]
+        trace, result = batch.trace(self._pattern), batch.runs(self._pattern, 1)[0]
         ratio = [np.abs(trace["r"]) / trace["J"]]
         for table in self._tables:
             estimates = Uio(library(self.real), table, width=trace["value"].shape[1], moving=self.start == MOVING).run(trace["value"], trace["radius"])
@@ -116,16 +116,23 @@ class Search:
             known[table.estimates - n - table.unknown : table.estimates - n] = False  # what a low pass is to make of a road is not one number
             ratio.append(np.where(known, np.abs(estimates.estimate - truth) / estimates.radius, 0.0))
         ratios = np.hstack(ratio)
-        self.found.runs += 1
-        self.found.provisional += int(result["false_provisional"])
-        self.found.confirmed += int(result["false_confirmed"])
-        if not self.loss:
+        _, low, high = self._kept(reading, state, 1.0)
+        if np.all((low <= 0) & (high >= 0)):
+            self.found.runs += 1
+            self.found.provisional += int(result["false_provisional"])
+            self.found.confirmed += int(result["false_confirmed"])
             self.found.ratio = np.maximum(self.found.ratio, ratios.max(0))
+        else:
+            self.found.outside += 1
+            ratios = np.zeros_like(ratios)
         return Traced(choice, reading, state, trace, ratios)
 
     def attack(self, aim: Aim, sample: int, sign: float, begin: Choice | None = None) -> float:
         """From a corner, or from a choice, uphill; the largest ratio that was reached at the sample."""
-        now = self.run(begin or self._bounded(self._world.draw(self._rng)))
+        self._pattern += 1
+        self._world.certain()
+        self._moves = self._world.moves()
+        now = self.run(begin or self._bounded())
         reached = now.ratio[sample, aim.place]
         for _ in range(ROUNDS):
             better = self._improve(now, aim, sample, sign)
@@ -137,28 +144,30 @@ class Search:
             reached = now.ratio[sample, aim.place]
         return float(max(reached, now.ratio[sample, aim.place]))
 
-    def _bounded(self, choice: Choice) -> Choice:
-        """The nearest choice that keeps slews and ranges: none has to where the design has found the slews itself."""
-        rows, low, high = self._kept(*self._world.run(choice))
-        if len(rows) == 0 or bool(np.all((low <= 0) & (high >= 0))):
-            return choice
-        return self._solve(self._rng.normal(size=self._moves[0].shape[2]), choice, rows, low, high) or choice
+    def _bounded(self) -> Choice:
+        """A corner of what keeps slews and ranges; any corner where the design has found the slews itself."""
+        quiet = self._world.quiet()
+        rows, low, high = self._kept(*self._world.run(quiet))
+        if len(rows) == 0:
+            return self._world.draw(self._rng)
+        return self._solve(self._rng.normal(size=rows.shape[1]), quiet, rows, low, high) or quiet
 
     def _improve(self, now: Traced, aim: Aim, sample: int, sign: float) -> Choice | None:
         sent = (now.trace["events"][:, None] >> self._group & 1).astype(bool)
         lost = (now.trace["lost"][:, None] >> self._group & 1).astype(bool)
         held = last_frame(sent & ~lost)
-        moves, states = self._moves
-        goal = states[sample].T @ aim.state
+        weight = np.zeros_like(now.reading)  # of each reading: as long as it is held
         for j in range(min(sample + 1, len(aim.weight))):
-            for g in np.flatnonzero(aim.weight[j]):
-                source = held[sample - j, g]
-                if source >= 0:
-                    goal = goal + aim.weight[j, g] * moves[source, g]
+            g = np.flatnonzero(held[sample - j] >= 0)
+            np.add.at(weight, (held[sample - j, g], g), sign * aim.weight[j, g])
+        if self._world.uncertain:
+            self._world.worsen(now.reading, now.state, weight, sign * aim.state, sample)
+            self._moves = self._world.moves()
+        moves, states = self._moves
+        goal = np.einsum("kg,kgf->f", weight[: sample + 1], moves[: sample + 1]) + sign * (aim.state @ states[sample])
         silent = self._silent(now, last_frame(sent))
-        kept = self._kept(now.reading, now.state)
-        rows, low, high = (np.concatenate(parts) for parts in zip(silent, kept, strict=True))
-        return self._solve(sign * goal, now.choice, rows, low, high)
+        rows, low, high = (np.concatenate(parts) for parts in zip(silent, self._kept(now.reading, now.state), strict=True))
+        return self._solve(goal, now.choice, rows, low, high)
 
     def _silent(self, now: Traced, source: Array) -> tuple[Array, Array, Array]:
         """Where a sender looked and stayed silent its readings stay within its threshold of the one it sent: |reading - sent| <= promise."""
@@ -168,13 +177,13 @@ class Search:
         off = now.reading[k, g] - now.reading[from_, g]
         return moves[k, g] - moves[from_, g], -promise[k, g] - off, promise[k, g] - off
 
-    def _kept(self, reading: Array, state: Array) -> tuple[Array, Array, Array]:
+    def _kept(self, reading: Array, state: Array, share: float = INSIDE) -> tuple[Array, Array, Array]:
         """Declared slews, from each sample to the next, and the ranges of states."""
         moves, states = self._moves
         slews = [(i, s.slew[0]) for i, s in enumerate(self.made.model.signals) if s.slew]
         rows = [moves[1:, i] - moves[:-1, i] for i, _ in slews] + [states[:, i] for i, _ in self._world.bounded]
         off = [np.diff(reading[:, i]) for i, _ in slews] + [state[:, i] for i, _ in self._world.bounded]
-        limit = [np.full(len(o), b * INSIDE) for o, b in zip(off, [b for _, b in slews] + [b for _, b in self._world.bounded], strict=True)]
+        limit = [np.full(len(o), b * share) for o, b in zip(off, [b for _, b in slews] + [b for _, b in self._world.bounded], strict=True)]
         if not rows:
             return np.zeros((0, moves.shape[2])), np.zeros(0), np.zeros(0)
         middle, most = np.concatenate(off), np.concatenate(limit)

@@ -47,8 +47,28 @@ class World:
         self.reference = plant.feedback.reference_bound if plant.feedback is not None else largest
         self.held = plant.equilibrium_input
         # The plant of each sample; a certain one is always the same.
-        self.dA, self.dB = np.zeros((samples, self.n, self.n)), np.zeros((samples, self.n, plant.p))
+        self.uncertain = bool(plant.dA.any() or plant.dB.any())
+        self.certain()
         self._steps()
+
+    def certain(self) -> None:
+        """The middle of the intervals at every sample."""
+        self.dA, self.dB = np.zeros((self.samples, self.n, self.n)), np.zeros((self.samples, self.n, self.p))
+
+    def worsen(self, reading: Array, state: Array, weight: Array, last: Array, sample: int) -> None:
+        """At every sample the plant inside the intervals that makes sum weight . reading + last . state(sample) largest: a corner, by the adjoint of this run."""
+        model, plant = self.made.model, self.made.model.plant
+        shown = np.zeros((len(model.signals), self.n))
+        shown[model.outputs], shown[model.inputs] = self.C - plant.D @ self.gain, -self.gain
+        adjoint = shown.T @ weight[sample] + last
+        for k in range(sample - 1, -1, -1):
+            self.dA[k] = plant.dA * np.sign(np.outer(adjoint, state[k]))
+            self.dB[k] = plant.dB * np.sign(np.outer(adjoint, reading[k, model.inputs]))
+            adjoint = (self.A + self.dA[k] - (self.B + self.dB[k]) @ self.gain).T @ adjoint + shown.T @ weight[k]
+
+    def quiet(self) -> Choice:
+        """In the middle of everything."""
+        return Choice(self.middle.copy(), np.zeros((self.samples, self.nd)), np.zeros((self.samples, self.p)))
 
     def _road(self, spread: Array) -> Array:
         """Unknown inputs as states that change by no more than their rate: x+ = Ad x + W w + V s, w+ = w + rate period s, |s| <= 1."""
