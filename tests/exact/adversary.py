@@ -14,12 +14,13 @@ import scipy.optimize
 import scipy.sparse
 from hullguard.campaign.attack import functionals, last_frame
 from hullguard.core.library import library
-from hullguard.core.native import MOVING, REST, Batch, Native
+from hullguard.core.native import MOVING, Batch, Native
 from hullguard.core.native_uio import Uio, UioTable
 from hullguard.design.design import Design
 from hullguard.design.uio_generator import uio_table
 from hullguard.model.schema import Reference
 from hullguard.model.table import Array
+from numpy.typing import NDArray
 from world import Choice, World
 
 ROUNDS = 5  # programmes a start, until nothing grows
@@ -150,7 +151,7 @@ class Search:
         rows, low, high = self._kept(*self._world.run(quiet))
         if len(rows) == 0:
             return self._world.draw(self._rng)
-        return self._solve(self._rng.normal(size=rows.shape[1]), quiet, rows, low, high) or quiet
+        return self._solve(np.asarray(self._rng.normal(size=rows.shape[1])), quiet, rows, low, high) or quiet
 
     def _improve(self, now: Traced, aim: Aim, sample: int, sign: float) -> Choice | None:
         sent = (now.trace["events"][:, None] >> self._group & 1).astype(bool)
@@ -164,12 +165,12 @@ class Search:
             self._world.worsen(now.reading, now.state, weight, sign * aim.state, sample)
             self._moves = self._world.moves()
         moves, states = self._moves
-        goal = np.einsum("kg,kgf->f", weight[: sample + 1], moves[: sample + 1]) + sign * (aim.state @ states[sample])
+        goal = np.asarray(np.einsum("kg,kgf->f", weight[: sample + 1], moves[: sample + 1]) + sign * (aim.state @ states[sample]))
         silent = self._silent(now, last_frame(sent))
         rows, low, high = (np.concatenate(parts) for parts in zip(silent, self._kept(now.reading, now.state), strict=True))
         return self._solve(goal, now.choice, rows, low, high)
 
-    def _silent(self, now: Traced, source: Array) -> tuple[Array, Array, Array]:
+    def _silent(self, now: Traced, source: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         """Where a sender looked and stayed silent its readings stay within its threshold of the one it sent: |reading - sent| <= promise."""
         moves, promise = self._moves[0], now.trace["promise"] - self._half  # the value sent is a rounded reading
         k, g = np.nonzero(np.isfinite(promise))

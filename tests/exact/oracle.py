@@ -10,19 +10,18 @@ For the proof of a bound from below numbers are cut, never rounded up: to 2^-PLA
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from dyadic import Exact, exact, eye, joined, stacked, zeros
-from healthy import Healthy, matrices, within_slews
+from dyadic import Exact, exact, joined, zeros
+from healthy import Healthy, within_slews
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native, Node, Sender
 from hullguard.design import hull
 from hullguard.design.design import Design, Generator
-from hullguard.design.tables import GeneratorTable, Tables
+from hullguard.design.tables import GeneratorTable
 from hullguard.model.table import Array
 
 PLACES = 160
@@ -30,7 +29,7 @@ WIDENED = 1e-4  # more than sums of some hundred numbers are widened by in float
 UNIT = {"f32": Fraction(1, 2**24), "f64": Fraction(1, 2**53)}
 
 
-class Broken(Exception):
+class BrokenError(Exception):
     """A promise that does not hold."""
 
 
@@ -144,7 +143,7 @@ class Hull:
         self._initial: list[Exact] = []
         begun = exact(given.ranges.initial if start == REST else given.ranges.state)
         self._parts = (F, G, T, entering, disturbed, state, control, x, u, begun)
-        self._places = list(g.signal) + [p for p in range(made.tables.width - len(made.uncertain), made.tables.width)] if made.uncertain else list(g.signal)
+        self._places = [*g.signal, *range(made.tables.width - len(made.uncertain), made.tables.width)]
 
     def _further(self) -> None:
         """One more lag: F G^j."""
@@ -235,7 +234,7 @@ class Run:
         for k in range(count):
             self._truth.append(plant.step())
             if not within_slews(self.made, self._truth[-12:]):
-                raise Broken("the plant of this check moves faster than the model says: the check is wrong")
+                raise BrokenError("the plant of this check moves faster than the model says: the check is wrong")
             reading, shows = self._truth[-1].floats().tolist(), False
             for g in (*(g for g in range(len(self.made.tables.groups)) if g != closing), closing):
                 frame = self._sender.step(g, k, reading)
@@ -246,10 +245,10 @@ class Run:
                         self._node.receive(frame)
             verdict = self._node.step()
             if verdict is None:
-                raise Broken(f"sample {k}: no step was made")
+                raise BrokenError(f"sample {k}: no step was made")
             self._check(k, links, shows)
             if verdict.plant == "confirmed" or (verdict.plant == "provisional" and self.loss == 0.0):
-                raise Broken(f"sample {k}: a false alarm, {verdict.plant}")
+                raise BrokenError(f"sample {k}: a false alarm, {verdict.plant}")
         self.worst.samples = count
         return self.worst
 
@@ -288,14 +287,14 @@ class Run:
         off = abs(truth[place : place + 1] - self._values[k][held : held + 1]).fraction(0)
         radius = self._radii[k].fraction(held)
         if off > radius:
-            raise Broken(f"{what}: |true - value| = {float(off):.9g} is more than the radius {float(radius):.9g}")
+            raise BrokenError(f"{what}: |true - value| = {float(off):.9g} is more than the radius {float(radius):.9g}")
         self.worst.hold = max(self.worst.hold, float(off / radius) if radius else 0.0)
 
     def _rounded(self, k: int, i: int, r: Exact, found: Exact, bound: Array) -> None:
         for n in range(len(bound)):
             off = abs(r[self._first[i] + n : self._first[i] + n + 1] - found[n : n + 1]).fraction(0)
             if off > Fraction(float(bound[n])):
-                raise Broken(f"sample {k}, generator {i + 1}, residual {n + 1}: rounding has moved it by {float(off):.3g}, more than {bound[n]:.3g}")
+                raise BrokenError(f"sample {k}, generator {i + 1}, residual {n + 1}: rounding has moved it by {float(off):.3g}, more than {bound[n]:.3g}")
             self.worst.rounding = max(self.worst.rounding, float(off) / float(bound[n]) if off else 0.0)
 
     def _threshold(self, k: int, i: int, J: Exact, moved: Exact) -> None:
@@ -311,8 +310,8 @@ class Run:
                 continue
             a, b = own.fraction(n), least.fraction(n)
             if a < b:
-                raise Broken(f"sample {k}, generator {i + 1}, residual {n + 1}: J = {float(a):.9g} is less than the exact {float(b):.9g}")
+                raise BrokenError(f"sample {k}, generator {i + 1}, residual {n + 1}: J = {float(a):.9g} is less than the exact {float(b):.9g}")
             if a - b > Fraction(float(allowed[n])):
-                raise Broken(f"sample {k}, generator {i + 1}, residual {n + 1}: J = {float(a):.9g} is above the exact {float(b):.9g} by more than {allowed[n]:.3g}")
+                raise BrokenError(f"sample {k}, generator {i + 1}, residual {n + 1}: J = {float(a):.9g} is above the exact {float(b):.9g} by more than {allowed[n]:.3g}")
             self.worst.low = min(self.worst.low, float(a / b))
             self.worst.slack = max(self.worst.slack, float(a - b) / float(allowed[n]))
