@@ -20,11 +20,14 @@ from hullguard.errors import InputError
 from hullguard.model.builders import BUILDERS
 from hullguard.model.schema import NAME, parse_model
 from hullguard.model.table import Array, Table
-from hullguard.new.draft import Draft, Part, matrix, quoted, text
+from hullguard.model.uncertain import zero_order_hold
+from hullguard.new.draft import DRIVEN, Draft, Part, half, matrix, quoted, text
 from hullguard.new.sources import KEYS, StateSpace, read_file, read_inline
 
 USUAL = (-10.0, 10.0)
 DECAYS = 1 - 1e-9
+HALFWAY = 0.5  # of a range
+STEPS = 10_000  # samples in which a damped plant has shown what an input does
 SAMPLED = 0.1  # seconds, where a question is left empty
 
 
@@ -146,7 +149,9 @@ def _given(args: argparse.Namespace) -> Draft:
     outputs = _names(args.outputs, [f"y{i + 1}" for i in range(m)], m, "--outputs")
     inputs = _names(args.inputs, [f"u{i + 1}" for i in range(p)], p, "--inputs")
     draft = _draft(args, f"matrices from {Path(args.source).name if args.source else 'the command line'}", (), states, outputs, inputs, _sample_time(args, plant))
-    return replace(draft, plant=tuple(_matrices(plant, states, discrete)), damped=_damped(plant.A, discrete))
+    damped = _damped(plant.A, discrete)
+    driven = _driven(plant, draft, discrete) if damped and draft.inputs else DRIVEN
+    return replace(draft, plant=tuple(_matrices(plant, states, discrete)), damped=damped, driven=driven)
 
 
 def _matrices(plant: StateSpace, states: tuple[str, ...], discrete: bool) -> list[str]:
@@ -167,12 +172,23 @@ def _draft(args: argparse.Namespace, origin: str, lines: tuple[str, ...], states
             if name not in known:
                 raise InputError(f"{what} {name}: there is no such name: {', '.join(known)}")
     parts = [tuple(Part(n, *ranges.get(n, USUAL)) for n in names) for names in (outputs, inputs)]
-    return Draft(args.name, origin, lines, sample_time_s, states, parts[0], parts[1], args.measured_inputs, False, bounds, args.disturbance, args.noise)
+    return Draft(args.name, origin, lines, sample_time_s, states, parts[0], parts[1], args.measured_inputs, False, DRIVEN, bounds, args.disturbance, args.noise)
 
 
 def _damped(A: Array, discrete: bool) -> bool:
     values = np.linalg.eigvals(A)
     return bool(np.abs(values).max() < DECAYS if discrete else values.real.max() < -(1 - DECAYS))
+
+
+def _driven(plant: StateSpace, draft: Draft, discrete: bool) -> float:
+    """The share of the inputs' ranges, half at most, that moves no output further than HALFWAY, however the inputs step: |y| <= sum_k |C A^k B| |u| + |D| |u|."""
+    A, B = (plant.A, plant.B) if discrete else zero_order_hold(plant.A, plant.B, draft.sample_time_s)
+    reach = np.abs(plant.D)
+    for _ in range(STEPS):
+        reach, B = reach + np.abs(plant.C @ B), A @ B
+    furthest = reach @ np.full(len(draft.inputs), min(half(s) for s in draft.inputs))
+    shares = [HALFWAY * half(s) / y for s, y in zip(draft.outputs, furthest, strict=True) if y > 0.0]
+    return min([HALFWAY, *shares])
 
 
 def _sample_time(args: argparse.Namespace, plant: StateSpace | None) -> float:

@@ -12,7 +12,8 @@ WIRE_STEPS = 40_000  # of a range: resolution
 QUIET = 0.01  # of a range: a trigger's sigma
 INTERVAL = 10  # samples
 TRIALS = 1000
-DRIVEN = 0.05  # of an input's range: reference of the emulator
+DRIVEN = 0.05  # of an input's range: reference of the emulator, where nothing says how far the outputs would go
+BESIDE = 50  # column of the words beside a line
 ORDER_MAX = 12
 FIRST_ID = 0x110
 STEP_ID = 0x10
@@ -49,6 +50,7 @@ class Draft:
     inputs: tuple[Part, ...]
     measured: bool  # inputs are readings
     damped: bool  # all modes of the plant decay
+    driven: float  # of the inputs' ranges: reference of the emulator
     state_range: dict[str, float]
     disturbance: float
     noise: float
@@ -71,9 +73,24 @@ def quoted(names: list[str]) -> str:
     return "[" + ", ".join(f'"{n}"' for n in names) + "]"
 
 
+def beside(line: str, words: str) -> str:
+    """A line with words beside it."""
+    return f"{line:<{BESIDE}}# {words}" if len(line) < BESIDE else f"{line}  # {words}"
+
+
 def text(d: Draft) -> str:
     """The whole file."""
     return "\n".join([*_head(d), *_plant(d), *_signals(d), *_groups(d), *_detector(d), *_faults(d), *_scenarios(d)]) + "\n"
+
+
+def amplitude(d: Draft) -> float:
+    """How far the emulator moves every input, in the unit of the one with the narrowest range."""
+    return float(f"{min(half(s) for s in d.inputs) * d.driven:.2g}")
+
+
+def half(part: Part) -> float:
+    """How far a signal may go from zero, or from its end where that is zero."""
+    return min(abs(part.low), abs(part.high)) or part.high - part.low
 
 
 def _head(d: Draft) -> list[str]:
@@ -98,16 +115,15 @@ def _head(d: Draft) -> list[str]:
 
 
 def _plant(d: Draft) -> list[str]:
-    lines = ["[plant]", *d.plant, "initial_range = 1.0                               # CHECK: |state| at a start at rest"]
+    lines = ["[plant]", *d.plant, beside("initial_range = 1.0", "CHECK: |state| at a start at rest")]
     if d.state_range:
         lines.append("state_range = [" + ", ".join(number(d.state_range.get(s, 1e6)) for s in d.states) + "]  # |state| in operation; 1e6: nothing is known of it")
-    lines.append(
-        "disturbance = { state = [" + ", ".join([number(d.disturbance)] * len(d.states)) + "] }   # CHECK: what moves each besides the inputs, a sample; identify finds it"
-    )
+    bounds = ", ".join([number(d.disturbance)] * len(d.states))
+    lines.append(beside(f"disturbance = {{ state = [{bounds}] }}", "CHECK: what moves each besides the inputs, a sample; identify finds it"))
     if d.inputs:
-        bound = min(min(abs(s.low), abs(s.high)) or s.high - s.low for s in d.inputs) * DRIVEN
+        bound = amplitude(d)
         regulator = "gain = [" + ", ".join("[" + ", ".join("0.0" for _ in d.states) + "]" for _ in d.inputs) + "]" if d.damped else "state_weights = 1.0, input_weights = 1.0"
-        lines.append(f"feedback = {{ {regulator}, reference_bound = {number(float(f'{bound:.3g}'))} }}  # drives the emulator only: every slew below is declared")
+        lines.append(f"feedback = {{ {regulator}, reference_bound = {number(bound)} }}  # drives the emulator only: every slew below is declared")
     return [*lines, ""]
 
 
@@ -115,10 +131,10 @@ def _signals(d: Draft) -> list[str]:
     lines = ["# Slews as wide as the ranges are safe: they count in silent samples and after lost frames only, and identify finds better ones."]
     for part, role in [*((p, "output") for p in d.outputs), *((p, "input") for p in d.inputs)]:
         lines += ["[[signals]]", f'name = "{part.name}"', f'role = "{role}"']
-        lines += [f"range = [{number(part.low)}, {number(part.high)}]" + " " * 24 + "# CHECK"]
+        lines += [beside(f"range = [{number(part.low)}, {number(part.high)}]", "CHECK")]
         lines += [f"resolution = {number(part.resolution)}", f"slew = [{number(part.high - part.low)}]"]
         if role == "output" or d.measured:
-            lines.append(f"noise = {number(d.noise)}                                     # CHECK; identify finds that of outputs")
+            lines.append(beside(f"noise = {number(d.noise)}", "CHECK; identify finds it" if role == "output" else "CHECK"))
         lines.append("")
     return lines
 
@@ -161,5 +177,5 @@ def _scenarios(d: Draft) -> list[str]:
     size = float(f"{0.25 * (first.high - first.low):.3g}")
     what = "actuator" if d.inputs and not d.measured else "sensor"
     period = float(f"{60 * d.sample_time_s:.3g}")
-    reference = f'reference = {{ kind = "steps", amplitude = 1.0, period_s = {number(period)} }}' if d.inputs else 'reference = { kind = "rest" }'
+    reference = f'reference = {{ kind = "steps", amplitude = {number(amplitude(d))}, period_s = {number(period)} }}' if d.inputs else 'reference = { kind = "rest" }'
     return ["[[scenarios]]", 'name = "default"', "samples = 300", reference, f'faults = ["{first.name[: 30 - len(what)]}_{what}:bias:{size:g}@150"]']
