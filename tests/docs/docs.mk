@@ -2,7 +2,7 @@
 
 .PHONY: docs figures figures-check
 docs: lib ## build/docs/: the headers as a manual, and all pages, as HTML; fails where something is not explained or a link leads nowhere
-	@$(PY) tests/docs/site.py $(BUILD)/docs
+	@$(PY) tests/docs/manual.py $(BUILD)/docs
 
 figures: lib ## make every picture and every measured table of the documentation again, from commands
 	@$(PY) tests/docs/figures.py

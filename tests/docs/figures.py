@@ -96,6 +96,18 @@ class Table:
         return "\n".join(["", *(f"    hullguard {c}" for c in self.commands), "", *lines, *("| " + " | ".join(row) + " |" for row in self.rows), "", ""])
 
 
+@dataclass(frozen=True)
+class Words:
+    """Commands and what the last of them said."""
+
+    commands: tuple[str, ...]
+    lines: tuple[str, ...]
+
+    def text(self) -> str:
+        """As markdown."""
+        return "\n".join(["", *(f"    hullguard {c}" for c in self.commands), "", *(f"    {line}" for line in self.lines), "", ""])
+
+
 def varied(key: str, values: Sequence[str], title: str, extra: str = "") -> Table:
     """A campaign over one key, and the smallest fault that the design promises at each value."""
     every = f"{key}={','.join(values)}"
@@ -210,8 +222,34 @@ def losses() -> Table:
     return Table((command,), ("share of frames lost", "runs with a provisional alarm", "with a confirmed one"), tuple(rows))
 
 
-TABLES: dict[str, Callable[[], Table]] = {
-    f.__name__: cache(f) for f in (trigger, kinds, interval, state, noise, plants, order, threshold, banks, beyond, losses)
+def identified() -> Words:
+    """Bounds from a recording, here of the emulated plant, whose own bounds are known: 0.01 each."""
+    commands = ("run platoon --bus inprocess --scenario manoeuvres --no-fault --samples 1000 --seed 3 --out drive", "identify platoon --csv drive/signals.csv --bus-load 0.4 --force --out identified")
+    said(f"{commands[0]} -q")
+    return Words(commands, tuple(line for line in said(commands[1]).splitlines() if not line.startswith("model: ")))
+
+
+def attacked() -> Table:
+    """Disturbances within their bounds, at random and chosen against the detector."""
+    command = "campaign platoon --scenario manoeuvres --runs 200 --seed 13 --attack .."
+    found = [(name, cases(command.replace("..", share))[0]) for name, share in (("at random", "0"), ("against the detector", "1"))]
+    rows = [(name, f"{c['margin_settled_max']:.3f}", f"{c['false_alarm_runs']} of {c['runs']}") for name, c in found]
+    return Table((command,), ("disturbances", "largest residual / threshold, settled", "runs with a false alarm"), tuple(rows))
+
+
+def started() -> Table:
+    """A detector that is told of another start than the plant has."""
+    run = "run platoon --bus inprocess --scenario manoeuvres --no-fault --samples 300 --seed 3 --out moved"
+    said(f"{run} -q")
+    rows = []
+    for name, options in (("0.5 m/s, 1 m: the plant's", ""), ("0.01 m/s, 0.01 m", " --set plant.initial_range={speed=0.01,gap=0.01}")):
+        verdicts = json.loads(said(f"detect platoon --rest --log moved/run.log --json -q{options}"))["verdicts"]
+        rows.append((name, ", ".join(f"{v['plant']} from sample {v['k']}" for v in verdicts), f"`{options.strip()}`" if options else ""))
+    return Table((run, "detect platoon --rest --log moved/run.log OPTIONS"), ("initial_range of the detector", "verdicts", "options"), tuple(rows))
+
+
+TABLES: dict[str, Callable[[], Table | Words]] = {
+    f.__name__: cache(f) for f in (identified, trigger, kinds, interval, state, noise, plants, order, threshold, banks, beyond, attacked, started, losses)
 }  # fmt: skip
 
 
@@ -227,6 +265,7 @@ def curves(left: str, xlabel: str, x: str, y: tuple[tuple[str, str, str], ...], 
 
     def draw(path: Path) -> None:
         table = TABLES[left]()
+        assert isinstance(table, Table)
         column = {name: [_number(row[i]) for row in table.rows] for i, name in enumerate(table.header) if all(re.fullmatch(r"[\d.]+( %)?|none|–", row[i]) for row in table.rows)}
         with mpl.rc_context(RC):
             figure = Figure(figsize=(7.6, 2.5), layout="constrained")
@@ -243,8 +282,8 @@ def curves(left: str, xlabel: str, x: str, y: tuple[tuple[str, str, str], ...], 
 
 def platoon(path: Path) -> None:
     """The run that `make demo` shows."""
-    said("run platoon --bus inprocess -q --out platoon")
-    write_picture(WORK / "platoon", path)
+    said("run platoon --bus inprocess -q --out demo")
+    write_picture(WORK / "demo", path)
 
 
 TAMPERED = (

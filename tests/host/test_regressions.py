@@ -175,3 +175,10 @@ def test_the_example_of_the_model_file_needs_no_feedback() -> None:
     shipped["detector"]["observers"][0]["search"]["trials"] = 20
     model = parse_model(shipped, Path("open.toml"))
     assert np.all(np.isfinite(made(model).stored.state_range))
+
+
+def test_a_folder_called_like_a_shipped_model_does_not_hide_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `hullguard run platoon --out platoon` leaves one."""
+    (tmp_path / "platoon").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert load_model("platoon").name == "platoon"

@@ -203,7 +203,7 @@ def _members(site: Site, item: Item, here: str) -> str:
 
 
 def _said(m: Member) -> str:
-    return " ".join(m.text.split())
+    return " ".join(m.text.split()) or "what its type says"
 
 
 # ---- markdown ----
@@ -251,7 +251,7 @@ def _target(site: Site, page: Path, to: str, here: str) -> str:
     path = Path(os.path.normpath(page.parent / name))
     if path in site.pages or any((ROOT / path) == h.path for h in site.headers):
         return _relative(address(path), here) + mark + anchor
-    if path.suffix in (".png", ".svg"):
+    if path.suffix in (".png", ".svg") and (ROOT / path).is_file():
         kept = site.out / path
         kept.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / path, kept)
