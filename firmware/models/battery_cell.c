@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0xA287CAAE */
 #include "battery_cell.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group cell: voltage_v ---- */
@@ -573,7 +575,7 @@ static const hg_message status = {.id = 0x491UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_battery_cell_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_BATTERY_CELL_HASH,
+    .heartbeat = 10U, .model_hash = HG_BATTERY_CELL_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_battery_cell_sender[HG_BATTERY_CELL_GROUPS] = {
@@ -581,11 +583,27 @@ const hg_sender_config hg_battery_cell_sender[HG_BATTERY_CELL_GROUPS] = {
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_battery_cell_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_battery_cell_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_BATTERY_CELL_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_battery_cell_node_start(hg_battery_cell_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_battery_cell_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = NULL, .hull = NULL, .zonotope = NULL, .bank = NULL,
                      .polynomial = self->polynomial,
@@ -605,4 +623,22 @@ hg_status hg_battery_cell_senders_start(hg_battery_cell_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_battery_cell_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_F64
+#define SELFTEST 0xF8D55D90UL
+#elif HG_REAL_F32
+#define SELFTEST 0x50E9FAEBUL
+#endif
+
+hg_status hg_battery_cell_selftest(hg_battery_cell_node *self)
+{
+    static const int32_t code[HG_BATTERY_CELL_SIGNALS] = {7460, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 0U, .spread = 32U,
+        .size = -250, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_battery_cell_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

@@ -6,6 +6,8 @@
  *  Model hash, as in the status frame: 0xB7ECF4ED */
 #include "cubic_suspension.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group corner: deflection_m ---- */
@@ -464,7 +466,7 @@ static const hg_message status = {.id = 0x431UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_cubic_suspension_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_CUBIC_SUSPENSION_HASH,
+    .heartbeat = 10U, .model_hash = HG_CUBIC_SUSPENSION_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_cubic_suspension_sender[HG_CUBIC_SUSPENSION_GROUPS] = {
@@ -472,11 +474,27 @@ const hg_sender_config hg_cubic_suspension_sender[HG_CUBIC_SUSPENSION_GROUPS] = 
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_cubic_suspension_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_cubic_suspension_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_CUBIC_SUSPENSION_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_cubic_suspension_node_start(hg_cubic_suspension_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_cubic_suspension_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = NULL, .hull = NULL, .zonotope = NULL, .bank = NULL,
                      .polynomial = self->polynomial,
@@ -496,4 +514,22 @@ hg_status hg_cubic_suspension_senders_start(hg_cubic_suspension_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_cubic_suspension_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_F64
+#define SELFTEST 0xC8C34B1CUL
+#elif HG_REAL_F32
+#define SELFTEST 0x732328B3UL
+#endif
+
+hg_status hg_cubic_suspension_selftest(hg_cubic_suspension_node *self)
+{
+    static const int32_t code[HG_CUBIC_SUSPENSION_SIGNALS] = {0, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 27U, .fault = 24U, .signal = 0U, .spread = 64U,
+        .size = 1250, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_cubic_suspension_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

@@ -6,6 +6,7 @@
 #ifndef HULLGUARD_MODEL_FUSION5_H
 #define HULLGUARD_MODEL_FUSION5_H
 
+#include "hullguard/digest_tracker.h"
 #include "hullguard/tracker.h"
 
 #if HG_FUSION_STATES_MAX < 4U
@@ -28,6 +29,12 @@ extern "C" {
 #define HG_FUSION5_ONSETS 25U
 #define HG_FUSION5_SAMPLE_TIME_US 100000UL /* microseconds between two ticks */
 #define HG_FUSION5_HASH 0xC49B8CB2UL /* changes with any number of the tables */
+/* Digest of the tables, for each number type (digest.h). */
+#if HG_REAL_F64
+#define HG_FUSION5_DIGEST 0xC43AFECCUL
+#elif HG_REAL_F32
+#define HG_FUSION5_DIGEST 0x3A931FB8UL
+#endif
 
 /* States. */
 enum {
@@ -71,11 +78,21 @@ typedef struct {
     hg_real               estimate[2U * HG_FUSION5_STATES];
 } hg_fusion5_tracker;
 
+#if HG_WITH_DIGEST
+/** Take the next numbers of the model's tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+ *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
+ *  @retval HG_OK        that was the last one, and all is as generated
+ *  @retval HG_E_BUSY    there are more
+ *  @retval HG_E_DIGEST  that was the last one, and something is not */
+hg_status hg_fusion5_check(hg_digest *walk, uint32_t numbers);
+#endif
+
 /** Start a node; self->tracker is then ready for hg_tracker_receive().
  *  @param[out] self  memory, owned by the caller  @param[in] how  as hg_tracker_start()
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
- *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library */
+ *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library
+ *  @retval HG_E_DIGEST    tables are not as they were generated */
 hg_status hg_fusion5_tracker_start(hg_fusion5_tracker *self, hg_start how);
 
 #ifdef __cplusplus

@@ -538,11 +538,27 @@ const hg_tracker_config hg_fusion5_fast_config = {
     .estimate = estimate, .heartbeat = 10U, .interval = 10U, .model_hash = HG_FUSION5_FAST_HASH,
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_fusion5_fast_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_tracker(walk, &hg_fusion5_fast_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_FUSION5_FAST_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_fusion5_fast_tracker_start(hg_fusion5_fast_tracker *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_fusion5_fast_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_tracker_memory memory = {
         .fusion = {.slot = self->slot, .entry = self->entry, .sensor = self->sensor, .record = self->record, .origin = self->origin, .real = self->real},
         .consistency = {.sum = self->sum, .sensor = self->judged, .real = self->response},

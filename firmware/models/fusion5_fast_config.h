@@ -16,5 +16,6 @@
 #define HG_WITH_BANK 0
 #define HG_WITH_PREDICT 0
 #define HG_WITH_MISMATCH 0
+#define HG_WITH_FREEZE 0
 
 #endif

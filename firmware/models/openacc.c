@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0xA32076D0 */
 #include "openacc.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group car1: speed1_mps, accel1_mps2 ---- */
@@ -3925,7 +3927,7 @@ static const hg_message status = {.id = 0x291UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_openacc_config = {
     .detector = &detector, .message = message, .closing = 5U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_OPENACC_HASH,
+    .heartbeat = 10U, .model_hash = HG_OPENACC_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_openacc_sender[HG_OPENACC_GROUPS] = {
@@ -3937,11 +3939,27 @@ const hg_sender_config hg_openacc_sender[HG_OPENACC_GROUPS] = {
     {.message = &message[5], .trigger = &trigger[5]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_openacc_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_openacc_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_OPENACC_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_openacc_node_start(hg_openacc_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_openacc_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
                      .alarm = self->alarm, .code = self->code, .codes = 28U, .real = self->real, .reals = 623UL,
@@ -3960,4 +3978,25 @@ hg_status hg_openacc_senders_start(hg_openacc_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_openacc_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_Q31
+#define SELFTEST 0xBCBE1794UL
+#elif HG_REAL_F64
+#define SELFTEST 0xC8E52985UL
+#elif HG_REAL_F32
+#define SELFTEST 0xC54A58F7UL
+#endif
+
+hg_status hg_openacc_selftest(hg_openacc_node *self)
+{
+    static const int32_t code[HG_OPENACC_SIGNALS] = {-7000, 0, -7000, -12250, 0, -7000, -12250, 0, -7000, -12250, 0, -7000, -12250, 0}; /*
+        at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 0U, .spread = 16U,
+        .size = 2875, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_openacc_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

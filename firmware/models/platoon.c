@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0x239F4EA9 */
 #include "platoon.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group measurement: gap12_m, gap23_m, speed1_mps ---- */
@@ -445,7 +447,7 @@ static const hg_message status = {.id = 0x131UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_platoon_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_PLATOON_HASH,
+    .heartbeat = 10U, .model_hash = HG_PLATOON_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_platoon_sender[HG_PLATOON_GROUPS] = {
@@ -453,11 +455,27 @@ const hg_sender_config hg_platoon_sender[HG_PLATOON_GROUPS] = {
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_platoon_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_platoon_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_PLATOON_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_platoon_node_start(hg_platoon_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_platoon_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
                      .alarm = self->alarm, .code = self->code, .codes = 12U, .real = self->real, .reals = 152UL,
@@ -476,4 +494,24 @@ hg_status hg_platoon_senders_start(hg_platoon_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_platoon_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_Q31
+#define SELFTEST 0x2AC1881CUL
+#elif HG_REAL_F64
+#define SELFTEST 0x9E8781EBUL
+#elif HG_REAL_F32
+#define SELFTEST 0x7E14D0AEUL
+#endif
+
+hg_status hg_platoon_selftest(hg_platoon_node *self)
+{
+    static const int32_t code[HG_PLATOON_SIGNALS] = {0, 0, 0, 0, 0, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 26U, .fault = 24U, .signal = 3U, .spread = 64U,
+        .size = 3750, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_platoon_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

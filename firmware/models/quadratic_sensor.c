@@ -6,6 +6,8 @@
  *  Model hash, as in the status frame: 0x60F0968C */
 #include "quadratic_sensor.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group corner: deflection_m ---- */
@@ -465,7 +467,7 @@ static const hg_message status = {.id = 0x431UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_quadratic_sensor_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_QUADRATIC_SENSOR_HASH,
+    .heartbeat = 10U, .model_hash = HG_QUADRATIC_SENSOR_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_quadratic_sensor_sender[HG_QUADRATIC_SENSOR_GROUPS] = {
@@ -473,11 +475,27 @@ const hg_sender_config hg_quadratic_sensor_sender[HG_QUADRATIC_SENSOR_GROUPS] = 
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_quadratic_sensor_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_quadratic_sensor_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_QUADRATIC_SENSOR_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_quadratic_sensor_node_start(hg_quadratic_sensor_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_quadratic_sensor_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = NULL, .hull = NULL, .zonotope = NULL, .bank = NULL,
                      .polynomial = self->polynomial,
@@ -497,4 +515,22 @@ hg_status hg_quadratic_sensor_senders_start(hg_quadratic_sensor_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_quadratic_sensor_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_F64
+#define SELFTEST 0xE807D66CUL
+#elif HG_REAL_F32
+#define SELFTEST 0x812EFC50UL
+#endif
+
+hg_status hg_quadratic_sensor_selftest(hg_quadratic_sensor_node *self)
+{
+    static const int32_t code[HG_QUADRATIC_SENSOR_SIGNALS] = {0, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 0U, .spread = 64U,
+        .size = 2500, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_quadratic_sensor_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

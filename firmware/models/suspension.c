@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0x61D939B1 */
 #include "suspension.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group corner1: deflection1_m, tyre1_m, wheel1_mps, body1_mps ---- */
@@ -1008,7 +1010,7 @@ static const hg_message status = {.id = 0x331UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_suspension_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 100U, .model_hash = HG_SUSPENSION_HASH,
+    .heartbeat = 100U, .model_hash = HG_SUSPENSION_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_suspension_sender[HG_SUSPENSION_GROUPS] = {
@@ -1016,11 +1018,27 @@ const hg_sender_config hg_suspension_sender[HG_SUSPENSION_GROUPS] = {
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_suspension_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_suspension_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_SUSPENSION_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_suspension_node_start(hg_suspension_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_suspension_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
                      .alarm = self->alarm, .code = self->code, .codes = 10U, .real = self->real, .reals = 674UL,
@@ -1039,4 +1057,24 @@ hg_status hg_suspension_senders_start(hg_suspension_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_suspension_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_Q31
+#define SELFTEST 0xEBEB7A11UL
+#elif HG_REAL_F64
+#define SELFTEST 0xFCF8A48AUL
+#elif HG_REAL_F32
+#define SELFTEST 0xDEA161AAUL
+#endif
+
+hg_status hg_suspension_selftest(hg_suspension_node *self)
+{
+    static const int32_t code[HG_SUSPENSION_SIGNALS] = {0, 0, 0, 0, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 3U, .spread = 64U,
+        .size = 2500, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_suspension_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

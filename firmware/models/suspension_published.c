@@ -6,6 +6,8 @@
  *  Model hash, as in the status frame: 0xBFBA6462 */
 #include "suspension_published.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group measurement: y1, y2, y3 ---- */
@@ -780,7 +782,7 @@ static const hg_message status = {.id = 0x231UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_suspension_published_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 100U, .model_hash = HG_SUSPENSION_PUBLISHED_HASH,
+    .heartbeat = 100U, .model_hash = HG_SUSPENSION_PUBLISHED_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_suspension_published_sender[HG_SUSPENSION_PUBLISHED_GROUPS] = {
@@ -788,11 +790,27 @@ const hg_sender_config hg_suspension_published_sender[HG_SUSPENSION_PUBLISHED_GR
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_suspension_published_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_suspension_published_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_SUSPENSION_PUBLISHED_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_suspension_published_node_start(hg_suspension_published_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_suspension_published_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
                      .alarm = self->alarm, .code = self->code, .codes = 8U, .real = self->real, .reals = 534UL,
@@ -811,4 +829,24 @@ hg_status hg_suspension_published_senders_start(hg_suspension_published_senders 
         result = hg_sender_start(&self->sender[i], &hg_suspension_published_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_Q31
+#define SELFTEST 0xBCAC7303UL
+#elif HG_REAL_F64
+#define SELFTEST 0x24692127UL
+#elif HG_REAL_F32
+#define SELFTEST 0x89284E64UL
+#endif
+
+hg_status hg_suspension_published_selftest(hg_suspension_published_node *self)
+{
+    static const int32_t code[HG_SUSPENSION_PUBLISHED_SIGNALS] = {0, 0, 0, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 2U, .spread = 1U,
+        .size = 12500, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_suspension_published_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

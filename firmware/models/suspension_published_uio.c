@@ -1326,11 +1326,27 @@ const hg_uio_config hg_suspension_published_uio_config[1] = {
               .mode_rest = observer1_mode_rest, .mode_moving = observer1_mode_moving}},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_suspension_published_uio_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_uio(walk, hg_suspension_published_uio_config, 1U, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_SUSPENSION_PUBLISHED_UIO_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_suspension_published_uio_start(hg_suspension_published_uio *self, const hg_detector *detector, hg_start how)
 {
     if ((self == NULL) || (detector == NULL)) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_suspension_published_uio_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     hg_real *memory = self->real;
     hg_status status = HG_OK;
     if (status == HG_OK) {

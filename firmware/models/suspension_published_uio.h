@@ -7,6 +7,7 @@
 #ifndef HULLGUARD_MODEL_SUSPENSION_PUBLISHED_UIO_H
 #define HULLGUARD_MODEL_SUSPENSION_PUBLISHED_UIO_H
 
+#include "hullguard/digest_uio.h"
 #include "hullguard/isolate.h"
 #include "hullguard/uio.h"
 
@@ -18,6 +19,14 @@
 /* Initialiser of the estimates' units: with HG_REAL_Q31 an estimate or radius x is held as the integer x 2^(31 - unit); a radius of
  * HG_REAL_MAX says nothing. */
 #define HG_SUSPENSION_PUBLISHED_UIO_UNITS {17, 3, 8, 3, 4, 3, 4}
+/* Digest of the observers' tables, for each number type (digest.h). */
+#if HG_REAL_Q31
+#define HG_SUSPENSION_PUBLISHED_UIO_DIGEST 0x7FC4DD96UL
+#elif HG_REAL_F64
+#define HG_SUSPENSION_PUBLISHED_UIO_DIGEST 0xD771B293UL
+#elif HG_REAL_F32
+#define HG_SUSPENSION_PUBLISHED_UIO_DIGEST 0x2F366895UL
+#endif
 
 /* Places of the estimates: faults of actuators, of sensors, unknown inputs, states; of each observer in turn. */
 enum {
@@ -40,11 +49,21 @@ typedef struct {
     hg_real      real[HG_UIO_REALS(8U, 4U, 7U, 8U)];
 } hg_suspension_published_uio;
 
+#if HG_WITH_DIGEST
+/** Take the next numbers of the observers' tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+ *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
+ *  @retval HG_OK        that was the last one, and all is as generated
+ *  @retval HG_E_BUSY    there are more
+ *  @retval HG_E_DIGEST  that was the last one, and something is not */
+hg_status hg_suspension_published_uio_check(hg_digest *walk, uint32_t numbers);
+#endif
+
 /** Begin, beside a detector of the same model that has just been started.
  *  @param[out] self  memory, owned by the caller  @param[in] how  what is known of the plant's motion, as the detector was told
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
- *  @retval HG_E_CONFIG    tables contradict one another, or the detector's ring */
+ *  @retval HG_E_CONFIG    tables contradict one another, or the detector's ring
+ *  @retval HG_E_DIGEST    tables are not as they were generated */
 hg_status hg_suspension_published_uio_start(hg_suspension_published_uio *self, const hg_detector *detector, hg_start how);
 
 /** The sample that the detector has just closed: self->estimate, self->radius and self->found are then its.

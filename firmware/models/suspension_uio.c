@@ -1801,11 +1801,44 @@ const hg_isolate_config hg_suspension_uio_isolate_config[1] = {
 };
 #endif
 
+#if HG_WITH_DIGEST
+hg_status hg_suspension_uio_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_uio(walk, hg_suspension_uio_config, 2U, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_SUSPENSION_UIO_DIGEST)) ? HG_E_DIGEST : result;
+}
+
+#if !HG_REAL_Q31
+hg_status hg_suspension_uio_isolate_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_isolate(walk, hg_suspension_uio_isolate_config, 1U, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_SUSPENSION_UIO_ISOLATE_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+#endif
+
 hg_status hg_suspension_uio_start(hg_suspension_uio *self, const hg_detector *detector, hg_start how)
 {
     if ((self == NULL) || (detector == NULL)) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_suspension_uio_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
+#if !HG_REAL_Q31
+#if HG_WITH_DIGEST
+    hg_digest_start(&walk);
+    const hg_status told = hg_suspension_uio_isolate_check(&walk, UINT32_MAX);
+    if (told != HG_OK) {
+        return told;
+    }
+#endif
+#endif
     hg_real *memory = self->real;
     hg_status status = HG_OK;
     if (status == HG_OK) {

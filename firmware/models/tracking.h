@@ -6,6 +6,7 @@
 #ifndef HULLGUARD_MODEL_TRACKING_H
 #define HULLGUARD_MODEL_TRACKING_H
 
+#include "hullguard/digest_tracker.h"
 #include "hullguard/tracker.h"
 
 #if HG_FUSION_STATES_MAX < 6U
@@ -28,6 +29,12 @@ extern "C" {
 #define HG_TRACKING_ONSETS 25U
 #define HG_TRACKING_SAMPLE_TIME_US 100000UL /* microseconds between two ticks */
 #define HG_TRACKING_HASH 0xECBB1870UL /* changes with any number of the tables */
+/* Digest of the tables, for each number type (digest.h). */
+#if HG_REAL_F64
+#define HG_TRACKING_DIGEST 0x3867EA7AUL
+#elif HG_REAL_F32
+#define HG_TRACKING_DIGEST 0xAEC23520UL
+#endif
 
 /* States. */
 enum {
@@ -73,11 +80,21 @@ typedef struct {
     hg_real               estimate[2U * HG_TRACKING_STATES];
 } hg_tracking_tracker;
 
+#if HG_WITH_DIGEST
+/** Take the next numbers of the model's tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+ *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
+ *  @retval HG_OK        that was the last one, and all is as generated
+ *  @retval HG_E_BUSY    there are more
+ *  @retval HG_E_DIGEST  that was the last one, and something is not */
+hg_status hg_tracking_check(hg_digest *walk, uint32_t numbers);
+#endif
+
 /** Start a node; self->tracker is then ready for hg_tracker_receive().
  *  @param[out] self  memory, owned by the caller  @param[in] how  as hg_tracker_start()
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
- *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library */
+ *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library
+ *  @retval HG_E_DIGEST    tables are not as they were generated */
 hg_status hg_tracking_tracker_start(hg_tracking_tracker *self, hg_start how);
 
 #ifdef __cplusplus

@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0xCAD78FF4 */
 #include "two_state.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group sensor: level ---- */
@@ -471,7 +473,7 @@ static const hg_message status = {.id = 0x461UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_two_state_config = {
     .detector = &detector, .message = message, .closing = 1U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_TWO_STATE_HASH,
+    .heartbeat = 10U, .model_hash = HG_TWO_STATE_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_two_state_sender[HG_TWO_STATE_GROUPS] = {
@@ -479,11 +481,27 @@ const hg_sender_config hg_two_state_sender[HG_TWO_STATE_GROUPS] = {
     {.message = &message[1], .trigger = &trigger[1]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_two_state_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_two_state_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_TWO_STATE_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_two_state_node_start(hg_two_state_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_two_state_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = NULL, .hull = NULL, .zonotope = NULL, .bank = NULL,
                      .polynomial = self->polynomial,
@@ -503,4 +521,22 @@ hg_status hg_two_state_senders_start(hg_two_state_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_two_state_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_F64
+#define SELFTEST 0x12ECA6E3UL
+#elif HG_REAL_F32
+#define SELFTEST 0x91C2C3E3UL
+#endif
+
+hg_status hg_two_state_selftest(hg_two_state_node *self)
+{
+    static const int32_t code[HG_TWO_STATE_SIGNALS] = {124, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 34U, .fault = 24U, .signal = 0U, .spread = 64U,
+        .size = 312, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_two_state_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

@@ -11,6 +11,9 @@
 #define VERDICT_LENGTH_WIDE 12U /* with room for candidates 31:16 */
 #define VERDICT_FAULTS 16U     /* candidates without that room */
 
+/* A macro, so that it is a constant for a compiler that does not optimise too: without the part there is nothing to link with. */
+#define FREEZES(config) ((HG_WITH_FREEZE != 0) && ((config)->freeze != NULL))
+
 static void raise16(uint16_t *counter, uint32_t by)
 {
     const uint32_t room = UINT16_MAX - (uint32_t)*counter;
@@ -79,7 +82,17 @@ static bool config_valid(const hg_node_config *config)
         valid = hg_frame_valid(&config->message[i]) && (config->detector->hold[i].trigger != NULL) &&
                 (config->message[i].width == config->detector->hold[i].trigger->width);
     }
-    return valid && has_counter(config->message[config->closing].e2e);
+    return valid && has_counter(config->message[config->closing].e2e) && (FREEZES(config) == (config->freeze != NULL));
+}
+
+/* The freeze frame records what the detector, which has been started, makes of each sample. */
+static hg_status start_freeze(hg_node *self, const hg_node_memory *memory)
+{
+    if (!FREEZES(self->config)) {
+        return HG_OK;
+    }
+    self->freeze = memory->freeze;
+    return hg_freeze_start(memory->freeze, self->config->freeze, &memory->frozen, &self->detector, self->config->model_hash);
 }
 
 hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_node_memory *memory, hg_start how)
@@ -98,7 +111,10 @@ hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_no
         hg_e2e_machine_start(&self->link[i].machine);
     }
     const hg_status status = hg_detector_start(&self->detector, config->detector, &memory->detector, how);
-    return ((status == HG_OK) && (!verdict_holds(config->verdict, &config->detector->decision))) ? HG_E_CONFIG : status;
+    if ((status == HG_OK) && (!verdict_holds(config->verdict, &config->detector->decision))) {
+        return HG_E_CONFIG;
+    }
+    return (status == HG_OK) ? start_freeze(self, memory) : status;
 }
 
 /* The group whose identifier this is, standard or extended alike; groups when there is none. */
@@ -377,8 +393,11 @@ hg_status hg_node_receive(hg_node *self, const hg_can_frame *frame)
     hg_e2e_progress progress = {.lost = 0U, .continues = false};
     const uint8_t group = group_of(self->config, frame);
     if (group >= self->config->detector->groups) {
-        raise32(&self->unknown);
-        return HG_E_ID;
+        const hg_status request = FREEZES(self->config) ? hg_freeze_receive(self->freeze, frame) : HG_E_ID;
+        if (request == HG_E_ID) {
+            raise32(&self->unknown);
+        }
+        return request;
     }
     if (self->due > 0U) {
         return HG_E_BUSY;
@@ -481,8 +500,17 @@ hg_status hg_node_step(hg_node *self, hg_verdict *verdict)
                             .basis = finding.basis,
                             .bus = bus_of(self),
                             .refused = refused(self)};
+    if (FREEZES(self->config)) {
+        const hg_freeze_row row = {.k = self->k, .candidates = finding.candidates, .bus = verdict->bus, .plant = finding.plant, .basis = finding.basis};
+        hg_freeze_step(self->freeze, &row);
+    }
     self->k++;
     return HG_OK;
+}
+
+hg_status hg_node_freeze(hg_node *self, hg_can_frame *frame)
+{
+    return FREEZES(self->config) ? hg_freeze_report(self->freeze, frame) : HG_E_EMPTY;
 }
 
 static hg_can_frame blank(const hg_message *message)

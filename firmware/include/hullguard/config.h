@@ -42,6 +42,12 @@
 #ifndef HG_WITH_POLYNOMIAL
 #define HG_WITH_POLYNOMIAL (1 - HG_REAL_Q31) /* its moments have no range that could be proven in fixed point */
 #endif
+#ifndef HG_WITH_DIGEST
+#define HG_WITH_DIGEST 1 /* of a model's tables, checked by its NAME_node_start() (digest.h) */
+#endif
+#ifndef HG_WITH_FREEZE
+#define HG_WITH_FREEZE 1 /* the last samples before a confirmed alarm, read over the bus (freeze.h) */
+#endif
 #if HG_REAL_Q31 && HG_WITH_ZONOTOPE
 #error "the zonotope is for the float types: a model for HG_REAL_Q31 has its threshold by the hull"
 #endif

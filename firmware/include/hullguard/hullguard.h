@@ -29,7 +29,13 @@
 #include "hullguard/e2e.h"
 #include "hullguard/can.h"
 #include "hullguard/frame.h"
+#include "hullguard/crc32c.h"
+#include "hullguard/freeze.h"
 #include "hullguard/node.h"
+#include "hullguard/digest.h"
+#include "hullguard/selftest.h"
 #include "hullguard/tracker.h"
+#include "hullguard/digest_tracker.h"
+#include "hullguard/digest_uio.h"
 
 #endif

@@ -5,6 +5,7 @@
  *
  *      on every frame:      hg_node_receive(&node, &frame)
  *      then, and overdue:   while (hg_node_step(&node, &verdict) == HG_OK) { send what hg_node_report() hands out }
+ *      then, with freeze.h: while (hg_node_freeze(&node, &frame) == HG_OK) { send the frame }
  *
  *  Stamps. The project's own frames carry k modulo 16. A measurement frame of another sample is early (1 .. 7 ahead) or late: counted, treated
  *  as lost, never booked to the wrong sample. Its counter may have moved by as many frames as the sender can have sent since the last good one
@@ -26,6 +27,7 @@
 #include "hullguard/detector.h"
 #include "hullguard/e2e.h"
 #include "hullguard/frame.h"
+#include "hullguard/freeze.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -71,6 +73,7 @@ typedef struct {                       /* flash: one a model, generated */
     const hg_message         *status;     /* 8 bytes, no fields; P22 */
     uint16_t                  heartbeat;  /* samples between heartbeats, >= 1 */
     uint32_t                  model_hash; /* of the model that the tables are of; the status frame carries it */
+    const hg_freeze_config   *freeze;     /* or null: nothing is recorded */
 } hg_node_config;
 
 typedef struct {            /* what happened on one group's link since the start; every counter saturates */
@@ -131,12 +134,15 @@ typedef struct {                /* RAM: one a node */
     hg_verdict      last;       /* the last one of those */
     uint8_t         verdict_counter; /* of the next verdict frame */
     uint8_t         status_counter;  /* of the next status frame */
+    hg_freeze      *freeze;     /* null without one */
 } hg_node;
 
 typedef struct {                /* owned by the caller; one storage type a model is generated */
     hg_detector_memory detector;
     hg_link           *link;    /* [groups] */
     int32_t           *closing; /* [width of the closing group] */
+    hg_freeze         *freeze;  /* this and the next are not read without a freeze frame */
+    hg_freeze_memory   frozen;
 } hg_node_memory;
 
 /** Begin before a sample. Sample 0 is open until a closing frame says otherwise.
@@ -147,6 +153,7 @@ typedef struct {                /* owned by the caller; one storage type a model
 hg_status hg_node_start(hg_node *self, const hg_node_config *config, const hg_node_memory *memory, hg_start how);
 
 /** Take a frame from the bus, whatever it is. Every refusal is counted in the group's link, and a refused or damaged frame of a group counts as lost.
+ *  A request for the freeze frame is answered as hg_freeze_receive() says; it is in no link, and hg_freeze.refused counts.
  *  @retval HG_OK          booked; after the closing frame hg_node_step() has work, and after one that is HG_E_STATE or HG_E_NUMERIC
  *  @retval HG_E_ID        not a frame of this model
  *  @retval HG_E_FORMAT    wrong length or kind
@@ -182,6 +189,9 @@ hg_status hg_node_step(hg_node *self, hg_verdict *verdict);
  *  @param[out] frame  [2]
  *  Result: number of frames, 0 .. 2. */
 uint8_t hg_node_report(hg_node *self, const hg_verdict *verdict, bool reply, hg_can_frame *frame);
+
+/** The next frame that answers a request for the freeze frame (freeze.h). @retval HG_OK  send *frame  @retval HG_E_EMPTY  none now, or no freeze frame */
+hg_status hg_node_freeze(hg_node *self, hg_can_frame *frame);
 
 /** Read a verdict frame; the other end of the wire. k is known modulo 4096, the model hash is not in it.
  *  @retval HG_OK  @retval HG_E_FORMAT  @retval HG_E_CRC */

@@ -38,7 +38,7 @@ def worst_bit_times(message: MessageTable, bitrate_bps: int, data_bitrate_bps: i
 
 
 def load_bound(tables: Tables, bitrate_bps: int, sample_time_s: float, data_bitrate_bps: int) -> float:
-    """Largest share of the bus: every sender at its shortest interval, a verdict and a status frame with every sample."""
+    """Largest share of the bus: every sender at its shortest interval, a verdict and a status frame with every sample, and a freeze frame that is being read."""
 
     def length(message: MessageTable) -> float:
         return worst_bit_times(message, bitrate_bps, data_bitrate_bps)
@@ -47,4 +47,6 @@ def load_bound(tables: Tables, bitrate_bps: int, sample_time_s: float, data_bitr
     for g in tables.groups:
         bits += length(g.message) / (min(g.silence) + 1)
     bits += length(tables.verdict) + length(tables.status) / tables.heartbeat
+    if tables.freeze is not None:
+        bits += length(tables.freeze.request) + tables.freeze.burst * length(tables.freeze.response)
     return bits / (sample_time_s * bitrate_bps)

@@ -16,6 +16,8 @@ import numpy as np
 from hullguard.codegen.both import Both, Scaled, both
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.codegen.statistic import statistic_configs, statistic_tables
+from hullguard.codegen.trust import by_type, check, check_about, checked, freeze_config, freeze_storage, selftest, selftest_about
+from hullguard.core import trust
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
 from hullguard.design.protection import ProtectionTable
@@ -172,7 +174,7 @@ def parts(design: Design) -> tuple[tuple[str, bool], ...]:
     modal = bool(design.uios) or any(isinstance(g, ModalGeneratorTable) for g in tables.generators)
     used = (
         *(("ZONOTOPE", zonotopes(tables)), ("BANK", tables.banks), ("PREDICT", tables.predictors), ("MISMATCH", tables.mismatch)),
-        *(("MODES", modal), ("POLYNOMIAL", tables.polynomials)),
+        *(("MODES", modal), ("POLYNOMIAL", tables.polynomials), ("FREEZE", tables.freeze)),
     )
     return tuple((f"HG_WITH_{part}", bool(there)) for part, there in used)
 
@@ -244,13 +246,21 @@ def _storage(tables: Tables) -> list[str]:
         f"    int32_t     code[{codes}];",
         f"    int32_t     closing[{closing}];",
         f"    hg_real     real[{tables.reals}];",
+        *freeze_storage(tables.freeze, tables.width, tables.residuals),
         f"}} {t}_node;",
         "",
+        "#if HG_WITH_DIGEST",
+        *check_about("the model's tables"),
+        f"hg_status {t}_check(hg_digest *walk, uint32_t numbers);",
+        "#endif",
+        "",
+        *selftest_about(t),
         "/** Start a detector node; self->node is then ready for hg_node_receive().",
         " *  @param[out] self  memory, owned by the caller  @param[in] how  what is known of the plant's motion",
         " *  @retval HG_OK          ready",
         " *  @retval HG_E_ARGUMENT  a null pointer",
-        " *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library */",
+        " *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library",
+        " *  @retval HG_E_DIGEST    tables are not as they were generated */",
         f"hg_status {t}_node_start({t}_node *self, hg_start how);",
         "",
         "/* Memory of all senders of the model, for whoever plays the plant; an ECU that is one of them needs one hg_sender only. */",
@@ -301,6 +311,7 @@ def _header(design: Design, names: Names) -> str:
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
+        '#include "hullguard/digest.h"',
         '#include "hullguard/node.h"',
         "",
         *_limits(design),
@@ -313,6 +324,7 @@ def _header(design: Design, names: Names) -> str:
         f"#define {prefix}_FAULTS {len(model.faults)}U",
         f"#define {prefix}_SAMPLE_TIME_US {sample_us}UL /* microseconds between two closing frames */",
         f"#define {prefix}_HASH 0x{tables.hash:08X}UL /* changes with any number of the tables */",
+        *by_type(f"{prefix}_DIGEST", trust.node_digests(tables), "Digest of the tables, for each number type (digest.h)."),
         "",
         *_enum(f"{prefix}_", "Places in the signal vector, group after group.", names.signals, spans),
         *_enum(f"{prefix}_GROUP_", "Groups: one sender and one frame each.", names.groups, kinds),
@@ -342,7 +354,7 @@ def _header(design: Design, names: Names) -> str:
 
 def _distinct(model: str, names: Names) -> None:
     """Refuse a signal whose constant would be another constant of the header."""
-    taken = {"SIGNALS", "GROUPS", "FAULTS", "SAMPLE_TIME_US", "HASH", "SIGNAL_NAMES", "GROUP_NAMES", "FAULT_NAMES", "UNITS"}
+    taken = {"SIGNALS", "GROUPS", "FAULTS", "SAMPLE_TIME_US", "HASH", "SIGNAL_NAMES", "GROUP_NAMES", "FAULT_NAMES", "UNITS", "DIGEST"}
     taken |= {f"GROUP_{n.upper()}" for n in names.groups} | {f"FAULT_{n.upper()}" for n in names.faults}
     for n in names.signals:
         if n.upper() in taken:
@@ -672,14 +684,14 @@ def _node(design: Design) -> list[str]:
     tables = design.tables
     t, prefix, count = f"hg_{tables.name}", f"HG_{tables.name.upper()}", len(tables.generators)
     predict, mismatch = present("predict", tables.predictors), "&mismatch" if tables.mismatch else "NULL"
-    own, bank = present("residual", tables.generators), present("bank", tables.banks)
+    residual, bank = present("residual", tables.generators), present("bank", tables.banks)
     thresholds = ("NULL", "zonotope") if zonotopes(tables) else (present("hull", tables.generators), "NULL")
     lines = [
         "/* detector: the whole of it */",
         "static const hg_detector_config detector = {",
         f"    .signals = {prefix}_SIGNALS, .width = {tables.width}U, .groups = {prefix}_GROUPS, .hold = hold,",
         f"    .predictors = {len(tables.predictors)}U, .predict = {predict}, .mismatch = {mismatch},",
-        f"    .generators = {count}U, .residual = {own}, .hull = {thresholds[0]}, .zonotope = {thresholds[1]},",
+        f"    .generators = {count}U, .residual = {residual}, .hull = {thresholds[0]}, .zonotope = {thresholds[1]},",
         f"    .banks = {len(tables.banks)}U, .bank = {bank},",
         *([f"    .polynomials = {len(tables.polynomials)}U, .polynomial = polynomial,"] if tables.polynomials else []),
         f"    .decision = {{.generators = {tables.judged}U, .feeds = feeds, .faults = moved_by,",
@@ -689,15 +701,18 @@ def _node(design: Design) -> list[str]:
         "};",
         "",
     ]
-    for n, m in (("verdict", tables.verdict), ("status", tables.status)):
+    own = [("verdict", tables.verdict), ("status", tables.status)]
+    own += [(m.name, m) for m in (tables.freeze.request, tables.freeze.response)] if tables.freeze else []
+    for n, m in own:
         lines += _protection(m.protection, n)
         body = _message(m, n, 0, "")
         body[0] = f"static const hg_message {n} = {body[0]}"
-        lines += [f"/* {n}: the detector's own frame; its byte map stands in frame.h */", body[0], "   " + body[1].removesuffix(",") + ";", ""]
+        lines += [f"/* {n}: the detector's own frame; its byte map stands in {'freeze' if n.startswith('freeze') else 'frame'}.h */", body[0], "   " + body[1].removesuffix(",") + ";", ""]
     lines += [
+        *freeze_config(tables.freeze),
         f"const hg_node_config {t}_config = {{",
         f"    .detector = &detector, .message = message, .closing = {tables.closing}U, .verdict = &verdict, .status = &status,",
-        f"    .heartbeat = {tables.heartbeat}U, .model_hash = {prefix}_HASH,",
+        f"    .heartbeat = {tables.heartbeat}U, .model_hash = {prefix}_HASH, .freeze = {'&freeze' if tables.freeze else 'NULL'},",
         "};",
         "",
         f"const hg_sender_config {t}_sender[{prefix}_GROUPS] = {{",
@@ -717,17 +732,23 @@ def _starts(tables: Tables) -> list[str]:
     own = [f"self->{name}" if there else "NULL" for name, there in parts]
     filters = " .polynomial = self->polynomial," if tables.polynomials else ""
     return [
+        "#if HG_WITH_DIGEST",
+        *check(f"{t}_check", f"hg_digest_node(walk, &{t}_config, numbers)", f"{prefix}_DIGEST")[:-1],
+        "#endif",
+        "",
         f"hg_status {t}_node_start({t}_node *self, hg_start how)",
         "{",
         "    if (self == NULL) {",
         "        return HG_E_ARGUMENT;",
         "    }",
+        *checked(f"{t}_check"),
         "    const hg_node_memory memory = {",
         *entries(f"        .detector = {{.hold = self->hold, .predict = {own[0]}, .residual = {own[1]}, .hull = {own[2]}, .zonotope = {own[3]}, .bank = {own[4]},{filters}", 21),
         f"                     .alarm = self->alarm, .code = self->code, .codes = {tables.codes}U, .real = self->real, .reals = {tables.reals}UL,",
         f"                     .sum = {own[5]}, .sums = {tables.sums}UL}},",
         "        .link = self->link,",
         "        .closing = self->closing,",
+        *(["        .freeze = &self->freeze,", "        .frozen = {.row = self->frozen, .real = self->frozen_real},"] if tables.freeze else []),
         "    };",
         f"    return hg_node_start(&self->node, &{t}_config, &memory, how);",
         "}",
@@ -750,9 +771,9 @@ def derived_names(tables: Tables, names: Names) -> list[str]:
     return predicted + [f"mismatch {i + 1}" for i in range(len(tables.mismatch.constant) if tables.mismatch else 0)]
 
 
-def _source(design: Design, names: Names) -> str:
+def _source(design: Design, names: Names, found: tuple[trust.Drive, dict[str, int]] | None) -> str:
     tables = design.tables
-    lines = [*banner(design, "its tables."), f'#include "{tables.name}.h"', "", "#include <stddef.h>", ""]
+    lines = [*banner(design, "its tables."), f'#include "{tables.name}.h"', "", '#include "hullguard/selftest.h"', "", "#include <stddef.h>", ""]
     for g, n in zip(tables.groups, names.groups, strict=True):
         lines += _group(g, n)
     lines += ["/* ---- All groups ---- */", "", *_groups(tables, names)]
@@ -763,10 +784,11 @@ def _source(design: Design, names: Names) -> str:
     lines += statistic_tables(tables, derived, table, reals)
     lines += ["/* ---- All generators and banks ---- */", "", *_generators(tables), *statistic_configs(tables, real), *_judged(tables), "/* ---- Node ---- */", "", *_node(design)]
     lines += _starts(tables)
+    lines += selftest(f"hg_{tables.name}", f"HG_{tables.name.upper()}", found)
     return "\n".join(lines) + "\n"
 
 
 def emit_c(design: Design) -> tuple[str, str]:
     """Text of NAME.h and NAME.c."""
     names = names_of(design)
-    return _header(design, names), _source(replace(design, tables=both(design.tables)), names)
+    return _header(design, names), _source(replace(design, tables=both(design.tables)), names, trust.selftest(design))

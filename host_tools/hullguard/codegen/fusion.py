@@ -8,6 +8,8 @@ from pathlib import Path
 from hullguard.codegen.c import _field, _message, _protection, _scale, _strings, banner, comment, present, real, reals, table, unsigned
 from hullguard.codegen.dbc import BASIS, BUS, DETECTOR, FAULT, FLAG, PLANT, Entry, Message, _entry, _header, _numbered, _symbol, dbc_text
 from hullguard.codegen.names import LIBRARY, UNITS, identifiers
+from hullguard.codegen.trust import by_type, check, check_about, checked
+from hullguard.core import trust
 from hullguard.design.fusion_model import EstimateTable, FusionDesign, FusionTables, SourceTable
 from hullguard.design.tables import SignalTable
 from hullguard.errors import InputError
@@ -53,6 +55,7 @@ def _c_header(made: FusionDesign) -> str:
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
+        '#include "hullguard/digest_tracker.h"',
         '#include "hullguard/tracker.h"',
         "",
         f"#if HG_FUSION_STATES_MAX < {t.states}U",
@@ -75,6 +78,7 @@ def _c_header(made: FusionDesign) -> str:
         *([f"#define {macro}_ONSETS {t.judge.onsets}U"] if t.judge else []),
         f"#define {macro}_SAMPLE_TIME_US {round(model.sample_time_s * 1e6)}UL /* microseconds between two ticks */",
         f"#define {macro}_HASH 0x{t.hash:08X}UL /* changes with any number of the tables */",
+        *by_type(f"{macro}_DIGEST", trust.tracker_digests(t), "Digest of the tables, for each number type (digest.h)."),
         "",
         *_places(f"{macro}_STATE_", "States.", model.plant.states, [unit_of(s) or "no unit" for s in model.plant.states]),
         *_places(f"{macro}_SENSOR_", "Sensors: bits of a verdict's candidates.", model.names, frames),
@@ -99,11 +103,17 @@ def _c_header(made: FusionDesign) -> str:
         f"    hg_real               estimate[2U * {macro}_STATES];",
         f"}} {prefix}_tracker;",
         "",
+        "#if HG_WITH_DIGEST",
+        *check_about("the model's tables"),
+        f"hg_status {prefix}_check(hg_digest *walk, uint32_t numbers);",
+        "#endif",
+        "",
         "/** Start a node; self->tracker is then ready for hg_tracker_receive().",
         " *  @param[out] self  memory, owned by the caller  @param[in] how  as hg_tracker_start()",
         " *  @retval HG_OK          ready",
         " *  @retval HG_E_ARGUMENT  a null pointer",
-        " *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library */",
+        " *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library",
+        " *  @retval HG_E_DIGEST    tables are not as they were generated */",
         f"hg_status {prefix}_tracker_start({prefix}_tracker *self, hg_start how);",
         "",
         "#ifdef __cplusplus",
@@ -214,11 +224,16 @@ def _c_source(made: FusionDesign) -> str:
         f"    .estimate = estimate, .heartbeat = {t.heartbeat}U, .interval = {t.interval}U, .model_hash = HG_{t.name.upper()}_HASH,",
         "};",
         "",
+        "#if HG_WITH_DIGEST",
+        *check(f"{prefix}_check", f"hg_digest_tracker(walk, &{prefix}_config, numbers)", f"HG_{t.name.upper()}_DIGEST")[:-1],
+        "#endif",
+        "",
         f"hg_status {prefix}_tracker_start({prefix}_tracker *self, hg_start how)",
         "{",
         "    if (self == NULL) {",
         "        return HG_E_ARGUMENT;",
         "    }",
+        *checked(f"{prefix}_check"),
         "    const hg_tracker_memory memory = {",
         "        .fusion = {.slot = self->slot, .entry = self->entry, .sensor = self->sensor, .record = self->record, .origin = self->origin, .real = self->real},",
         *(["        .consistency = {.sum = self->sum, .sensor = self->judged, .real = self->response},"] if t.judge else []),
@@ -238,7 +253,7 @@ def emit_config(made: FusionDesign) -> str:
     least = {"HG_GROUPS_MAX": 1, "HG_GROUP_SIGNALS_MAX": 2, "HG_LEVELS_MAX": 1, "HG_GENERATORS_MAX": 1, "HG_FUSION_STATES_MAX": t.states, "HG_FUSION_SENSORS_MAX": t.sensors}
     lines = [*banner(made, "what it needs of the library, for HG_CONFIG_HEADER."), f"#ifndef {guard}", f"#define {guard}", ""]
     lines += [f"#define {name} {number}U" for name, number in least.items()]
-    lines += [f"#define HG_WITH_{part} 0" for part in ("ZONOTOPE", "BANK", "PREDICT", "MISMATCH")]
+    lines += [f"#define HG_WITH_{part} 0" for part in ("ZONOTOPE", "BANK", "PREDICT", "MISMATCH", "FREEZE")]
     return "\n".join([*lines, "", "#endif"]) + "\n"
 
 

@@ -75,8 +75,9 @@ def unit_of(name: str) -> str:
 # The library's own headers: hg_NAME_config and NAME.h of a model that is called like one would be declared twice.
 LIBRARY = frozenset(
     {
-        *("bank", "can", "code", "config", "consistency", "decision", "detector", "e2e", "frame", "fusion", "hold", "hull", "hullguard", "isolate", "linalg"),
-        *("mismatch", "node", "polynomial", "predict", "real", "residual", "ring", "statistic", "status", "tracker", "trigger", "uio", "variance", "zonotope"),
+        *("bank", "can", "code", "config", "consistency", "crc32c", "decision", "detector", "digest", "digest_tracker", "digest_uio", "e2e", "frame", "freeze", "fusion"),
+        *("hold", "hull", "hullguard", "isolate", "linalg"),
+        *("mismatch", "node", "polynomial", "predict", "real", "residual", "ring", "selftest", "statistic", "status", "tracker", "trigger", "uio", "variance", "zonotope"),
     }
 )
 

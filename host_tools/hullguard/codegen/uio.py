@@ -12,6 +12,9 @@ import numpy as np
 
 from hullguard.codegen.both import Both, Scaled
 from hullguard.codegen.c import banner, comment, fill, float_only, real, reals, scaled, table, unsigned
+from hullguard.codegen.trust import by_type, check, check_about, checked
+from hullguard.core import trust
+from hullguard.core.library import REALS, library
 from hullguard.core.native_uio import UioTable
 from hullguard.design.arith import nearest32
 from hullguard.design.design import Design
@@ -87,6 +90,7 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
+        '#include "hullguard/digest_uio.h"',
         '#include "hullguard/isolate.h"',
         '#include "hullguard/uio.h"',
         "",
@@ -95,6 +99,7 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
         *_float([f"#define {names.macro}_ISOLATIONS {isolated}U /* estimates of actuators' faults that are told apart from weaker parts */"]),
         f"#define {names.macro}_ESTIMATES {estimates}U /* of all observers, one after another */",
         *_units(design, names),
+        *_digests(design, names, every),
         "",
         *comment("Places of the estimates: faults of actuators, of sensors, unknown inputs, states; of each observer in turn."),
         "enum {",
@@ -120,11 +125,18 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
         *_memory(made, every),
         f"}} {names.prefix};",
         "",
+        "#if HG_WITH_DIGEST",
+        *check_about("the observers' tables"),
+        f"hg_status {names.prefix}_check(hg_digest *walk, uint32_t numbers);",
+        *_float([*check_about("the tables of what tells causes apart"), f"hg_status {names.prefix}_isolate_check(hg_digest *walk, uint32_t numbers);"] if isolated else []),
+        "#endif",
+        "",
         "/** Begin, beside a detector of the same model that has just been started.",
         " *  @param[out] self  memory, owned by the caller  @param[in] how  what is known of the plant's motion, as the detector was told",
         " *  @retval HG_OK          ready",
         " *  @retval HG_E_ARGUMENT  a null pointer",
-        " *  @retval HG_E_CONFIG    tables contradict one another, or the detector's ring */",
+        " *  @retval HG_E_CONFIG    tables contradict one another, or the detector's ring",
+        " *  @retval HG_E_DIGEST    tables are not as they were generated */",
         f"hg_status {names.prefix}_start({names.prefix} *self, const hg_detector *detector, hg_start how);",
         "",
         "/** The sample that the detector has just closed: self->estimate, self->radius and self->found are then its.",
@@ -136,6 +148,26 @@ def _header(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
         "#endif",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _digests(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> list[str]:
+    """What the tables' digests must be."""
+    held = [real for real in REALS if real != "q31" or all(u.fixed is not None for u in design.uios)]
+    own = {real: trust.uio_digest(library(real), [uio_table(u, real) for u in design.uios]) for real in held}
+    lines = by_type(f"{names.macro}_DIGEST", own, "Digest of the observers' tables, for each number type (digest.h).")
+    told = [(uio_table(u), i.table) for u, isolated in zip(design.uios, every, strict=True) for i in isolated]
+    if told:
+        apart = {real: trust.isolate_digest(library(real), told) for real in REALS if real != "q31"}
+        lines += by_type(f"{names.macro}_ISOLATE_DIGEST", apart, "Digest of the tables of what tells their causes apart.")
+    return lines
+
+
+def _checks(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> list[str]:
+    isolated = sum(len(i) for i in every)
+    lines = check(f"{names.prefix}_check", f"hg_digest_uio(walk, {names.prefix}_config, {len(design.uios)}U, numbers)", f"{names.macro}_DIGEST")
+    walked = f"hg_digest_isolate(walk, {names.prefix}_isolate_config, {isolated}U, numbers)"
+    more = _float(check(f"{names.prefix}_isolate_check", walked, f"{names.macro}_ISOLATE_DIGEST")[:-1] if isolated else [])
+    return ["#if HG_WITH_DIGEST", *(lines if more else lines[:-1]), *more, "#endif", ""]
 
 
 def _units(design: Design, names: _Names) -> list[str]:
@@ -243,7 +275,7 @@ def _source(design: Design, names: _Names, every: Sequence[Sequence[Isolation]])
     if entries:
         isolating += [f"const hg_isolate_config {names.prefix}_isolate_config[{sum(len(i) for i in every)}] = {{", *entries, "};"]
         lines += [*_float(isolating), ""]
-    return "\n".join(lines + _start(design, names, every) + [""] + _follow(design, names, every)) + "\n"
+    return "\n".join(lines + _checks(design, names, every) + _start(design, names, every) + [""] + _follow(design, names, every)) + "\n"
 
 
 def _start(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) -> list[str]:
@@ -253,6 +285,20 @@ def _start(design: Design, names: _Names, every: Sequence[Sequence[Isolation]]) 
         "    if ((self == NULL) || (detector == NULL)) {",
         "        return HG_E_ARGUMENT;",
         "    }",
+        *checked(f"{names.prefix}_check"),
+        *_float(
+            [
+                "#if HG_WITH_DIGEST",
+                "    hg_digest_start(&walk);",
+                f"    const hg_status told = {names.prefix}_isolate_check(&walk, UINT32_MAX);",
+                "    if (told != HG_OK) {",
+                "        return told;",
+                "    }",
+                "#endif",
+            ]
+            if any(every)
+            else []
+        ),
         "    hg_real *memory = self->real;",
         "    hg_status status = HG_OK;",
     ]

@@ -16,7 +16,7 @@ from hullguard.core.library import Library
 from hullguard.core.protect import protection
 from hullguard.core.zonotope import fill
 from hullguard.design.design import Design
-from hullguard.design.tables import GeneratorTable, GroupTable, MessageTable, ModalGeneratorTable, Tables
+from hullguard.design.tables import FreezeTable, GeneratorTable, GroupTable, MessageTable, ModalGeneratorTable, Tables
 from hullguard.errors import InputError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.plant import Plant as PlantModel
@@ -74,6 +74,16 @@ class Native:
         self.node.detector, self.node.message, self.node.closing = detector, self.messages, tables.closing
         self.node.verdict, self.node.status = self.verdict, ffi.addressof(extra, 1)
         self.node.heartbeat, self.node.model_hash = tables.heartbeat, tables.hash
+        if tables.freeze is not None:
+            self.node.freeze = self._freeze(tables.freeze)
+
+    def _freeze(self, table: FreezeTable) -> Any:
+        made, messages = self._new("hg_freeze_config *"), self._new("hg_message[]", 2)
+        made.samples, made.after, made.burst = table.samples, table.after, table.burst
+        for i, message in enumerate((table.request, table.response)):
+            self._message(messages[i], message, None)
+        made.request, made.response = messages, self.library.ffi.addressof(messages, 1)
+        return made
 
     def _new(self, kind: str, value: Any = None) -> Any:
         made = self.library.ffi.new(kind, value)
@@ -261,6 +271,9 @@ class Node:
         own.code, own.codes, own.real, own.reals = room("int32_t", t.codes), d.codes, room("hg_real", d.reals), d.reals
         own.sum, own.sums = room("hg_acc", d.sums), d.sums
         memory.link, memory.closing = room("hg_link", groups), room("int32_t", len(t.groups[t.closing].signals) + 1)
+        if t.freeze is not None:
+            memory.freeze, memory.frozen.row = room("hg_freeze", 1), room("hg_freeze_row", t.freeze.samples)
+            memory.frozen.real = room("hg_real", t.freeze.samples * 2 * (t.width + t.residuals))
         self.node = ffi.new("hg_node *")
         status = lib.hg_node_start(self.node, native.node, memory, start)
         if status != lib.HG_OK:

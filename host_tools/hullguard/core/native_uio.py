@@ -123,10 +123,12 @@ class Uio:
             raise InputError("isolation is for the float types: it divides data of any ratio; use float32")
         self._width = max(*table.signal, *table.wide) + 1 if width is None else width
         config = self._new("hgh_uio_config *")
-        config.uio, config.width, config.history = self._observer(table), self._width, len(table.weight) + 1
+        self.config = self._observer(table)
+        config.uio, config.width, config.history = self.config, self._width, len(table.weight) + 1
         config.unit = self._new("int32_t[]", list(table.signal_units) or [0] * self._width)
         config.estimate_unit = self._new("int32_t[]", list(table.units) or [0] * table.estimates)
-        config.isolate = ffi.NULL if isolate is None else self._isolation(isolate, table.estimates)
+        self.isolation = ffi.NULL if isolate is None else self._isolation(isolate, table.estimates)
+        config.isolate = self.isolation
         config.start = lib.HG_START_MOVING if moving else lib.HG_START_REST
         self._self = ffi.gc(lib.hgh_uio_new(config), lib.hgh_uio_free)
         if not self._self:

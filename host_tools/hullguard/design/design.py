@@ -37,6 +37,8 @@ from hullguard.design.tables import (
     message_table,
     rows,
     verdict_table,
+    check_freeze,
+    freeze_table,
 )
 from hullguard.design.uio_generator import UioDesign
 from hullguard.design.uio_hull import ModalTables
@@ -326,7 +328,8 @@ def _fixed(model: Model, generators: tuple[Generator, ...], tables: Tables, uios
 def _unique_ids(model: Model, tables: Tables) -> None:
     """Refuse two messages that a checksum cannot tell apart. Those of a vehicle are as they are."""
     vehicles = {g.name for g in model.groups if g.frame.wire is not None}
-    messages = [m for m in ([g.message for g in tables.groups] + [tables.verdict, tables.status]) if m.protection.profile != NONE]
+    frozen = [tables.freeze.request, tables.freeze.response] if tables.freeze else []
+    messages = [m for m in ([g.message for g in tables.groups] + [tables.verdict, tables.status] + frozen) if m.protection.profile != NONE]
     for a, b in combinations(messages, 2):
         p, q = a.protection, b.protection
         if {a.name, b.name} <= vehicles or POLYNOMIAL[p.profile] != POLYNOMIAL[q.profile] or (p.data_ids, p.data_id) != (q.data_ids, q.data_id):
@@ -538,10 +541,12 @@ def _tables(
 ) -> Tables:
     made = tuple(_generator_table(model, g, derived) for g in generators)
     verdict, status = verdict_table(model), message_table("status", model.status, 8)
-    return Tables(
+    whole = Tables(
         model.name, groups, model.closing, made, model.debounce_up, model.debounce_down, model.latch, verdict, status, model.heartbeat, derived.predictors, derived.mismatch, banks,
-        polynomials=polynomials,
+        polynomials=polynomials, freeze=freeze_table(model),
     )  # fmt: skip
+    check_freeze(whole)
+    return whole
 
 
 def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, generators: tuple[Generator, ...]) -> list[Check]:
@@ -560,7 +565,8 @@ def _model_checks(model: Model, stored: Stored, tables: Tables, bound: float, ge
         modulus = group.message.protection.modulus
         if modulus:
             checks.append(Check(f"counter alias of {group.name}", group.interval_max + group.margin, modulus * (min(group.silence) + 1) - 1, "shorten interval_max or margin"))
-    return checks + [c for m in (*(g.message for g in tables.groups), tables.verdict, tables.status) for c in _protection_checks(model, m)]
+    frozen = (tables.freeze.request, tables.freeze.response) if tables.freeze else ()
+    return checks + [c for m in (*(g.message for g in tables.groups), tables.verdict, tables.status, *frozen) for c in _protection_checks(model, m)]
 
 
 def _protection_checks(model: Model, m: MessageTable) -> list[Check]:

@@ -27,6 +27,7 @@ EXTENDED, FD, BRS = 0x01, 0x04, 0x08
 MOTOROLA, SIGNED, FLOAT32 = 0x01, 0x02, 0x04
 CLASSIC_MAX = 8
 FD_LENGTHS = (*range(CLASSIC_MAX + 1), 12, 16, 20, 24, 32, 48, 64)
+FREEZE_WORDS_MAX = 0xFFFF  # hg_freeze_words()
 USUAL, LONG = "P22", "P05"  # profiles of frames of up to 12 bytes and of longer ones
 NARROW_FAULTS = 16  # candidates in a verdict frame of 8 bytes; one of 12 holds the rest
 
@@ -174,6 +175,17 @@ class ModalGeneratorTable(GeneratorTable):
 
 
 @dataclass(frozen=True)
+class FreezeTable:
+    """hg_freeze_config."""
+
+    samples: int
+    after: int
+    burst: int
+    request: MessageTable
+    response: MessageTable
+
+
+@dataclass(frozen=True)
 class Tables:
     """hg_node_config with all that hangs on it."""
 
@@ -195,6 +207,7 @@ class Tables:
     units: tuple[int, ...] = ()  # of fixed point: numbers are times 2^unit; the signal vector, then the residuals
     float_hash: int | None = None  # of fixed point: it is the same model
     polynomials: tuple[StatisticTable, ...] = ()
+    freeze: FreezeTable | None = None
 
     @property
     def signals(self) -> int:
@@ -258,8 +271,9 @@ class Tables:
         if self.float_hash is not None:
             return self.float_hash
         plain = _plain(replace(self, fixed=None, not_fixed=""))
-        if not self.polynomials:
-            del plain["polynomials"]  # a model without them is what it was before there were any
+        for part in ("polynomials", "freeze"):
+            if not plain[part]:
+                del plain[part]  # a model without it is what it was before there were any
         text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
 
@@ -395,6 +409,21 @@ def verdict_table(model: Model) -> MessageTable:
     if wide and model.verdict.fd is False:
         raise InputError(f"verdict frame: {len(model.faults)} faults need 12 bytes, 8 bytes of classic CAN name {NARROW_FAULTS}; leave fd out of its frame, or name fewer faults")
     return message_table("verdict", model.verdict, 12 if wide else 8)
+
+
+def freeze_table(model: Model) -> FreezeTable | None:
+    """hg_freeze_config, where the model keeps samples around an alarm."""
+    f = model.freeze
+    return None if f is None else FreezeTable(f.samples, f.after, f.burst, message_table("freeze_request", f.request, CLASSIC_MAX), message_table("freeze_response", f.response, CLASSIC_MAX))
+
+
+def check_freeze(tables: Tables) -> None:
+    """Refuse a record whose words have no number in a response; float64 has most of them."""
+    if tables.freeze is not None:
+        row = 3 + 4 * (tables.width + tables.residuals)
+        most = (FREEZE_WORDS_MAX - 4) // row
+        if tables.freeze.samples > most:
+            raise InputError(f"freeze.samples: {tables.freeze.samples} samples of {row} words are more than the {FREEZE_WORDS_MAX} that responses can number; at most {most}")
 
 
 def _check_alias(group: Group, message: MessageTable) -> None:

@@ -21,6 +21,7 @@ from hullguard.model.builders_car import TYRE
 from hullguard.model.choice import read_orders, read_parity, read_poles
 from hullguard.model.detector import DetectorSpec, read_detector
 from hullguard.model.faults import FaultSpec, parse_fault
+from hullguard.model.freeze import FreezeSpec, read_freeze
 from hullguard.model.network import Network, Wire, adopt, check_range
 from hullguard.model.plant import Plant, read_plant
 from hullguard.model.road import RoadSpec, read_road
@@ -211,6 +212,7 @@ class Model:
     sha256: str  # of everything that a design depends on
     uios: tuple[UioSpec, ...] = ()
     polynomials: tuple[polynomial.FilterSpec, ...] = ()
+    freeze: FreezeSpec | None = None
 
     @property
     def outputs(self) -> list[int]:
@@ -407,7 +409,12 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
     filters = _read_filters(inner, detector, outputs, faults) if kind == polynomial.KIND else ()
     observers = _read_observers(inner, outputs, inputs, faults) if kind not in (KIND, polynomial.KIND) else ()
     verdict, status, heartbeat, up, down, latch = _read_verdict(top.table("verdict"), groups)
-    _free(path, network, [("verdict", verdict), ("status", status), *((g.name, g.frame) for g in groups)])
+    own = [("verdict", verdict), ("status", status), *((g.name, g.frame) for g in groups)]
+    freeze = None
+    if "freeze" in top:
+        freeze = read_freeze(top.table("freeze"), _detector_frame, {(f.id, f.extended): n for n, f in own})
+        own += [("freeze.request", freeze.request), ("freeze.response", freeze.response)] if freeze else []
+    _free(path, network, own)
     scenarios = _read_scenarios(top, path)
     top.table("network", optional=True)  # read by adopt
     top.close()
@@ -436,6 +443,7 @@ def parse_model(source: dict[str, Any], path: Path) -> Model:
         sha256=_fingerprint(data | {"network": network.plain()} if network.taken else data),
         uios=uios,
         polynomials=filters,
+        freeze=freeze,
     )
 
 
@@ -464,8 +472,8 @@ def _read_filters(inner: Table, detector: DetectorSpec, outputs: list[str], faul
 
 
 def _fingerprint(data: dict[str, Any]) -> str:
-    """SHA-256 of all that the stored numbers of a design depend on: not scenarios, nor what only chooses among them."""
-    relevant = {k: v for k, v in data.items() if k != "scenarios"}
+    """SHA-256 of all that the stored numbers of a design depend on: not scenarios, the freeze frame, nor what only chooses among them."""
+    relevant = {k: v for k, v in data.items() if k not in ("scenarios", "freeze")}
     relevant["detector"] = {k: v for k, v in data.get("detector", {}).items() if k not in ("threshold", "zonotope", "prediction", "feedback_known")}
     for bank in ("bank", "isolation"):
         if bank in relevant["detector"]:
