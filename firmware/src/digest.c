@@ -283,7 +283,7 @@ static void bank(hg_digest *self, const hg_bank_config *config)
 static void detector(hg_digest *self, const hg_detector_config *config)
 {
     const uint32_t number[] = {
-        config->signals,  config->width,  config->groups,    config->predictors, flag(config->mismatch != NULL), config->generators, flag(config->hull != NULL),
+        config->signals,  config->width,  config->groups,    config->predictors, flag(config->mismatch != NULL), config->generators, flag((config->generators > 0U) && (config->hull != NULL)),
         config->banks,    config->polynomials, config->history, config->window,  config->residuals,              config->codes,      config->reals,
         config->sums,     config->decision.generators, config->decision.up, config->decision.down, flag(config->decision.latch),
     };
