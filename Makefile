@@ -41,7 +41,7 @@ UNIT_TESTS_q31  := test_q31
 UNIT_TESTS_bare := test_bare
 UNIT_TESTS_only := test_only
 UNIT_ONCE       := test_e2e_errors
-REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH POLYNOMIAL)
+REAL_FLAG_bare  := $(REAL_FLAG_f32) $(patsubst %,-DHG_WITH_%=0,ZONOTOPE BANK PREDICT MISMATCH POLYNOMIAL DIGEST FREEZE)
 REAL_FLAG_only  := $(REAL_FLAG_f32) -DHG_CONFIG_HEADER='"platoon_bank_config.h"'
 
 LIB_SRC     := $(wildcard firmware/src/*.c)

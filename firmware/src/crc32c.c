@@ -29,11 +29,15 @@ uint32_t hg_real_word(hg_real x, uint8_t word)
 {
 #if HG_REAL_F64
     uint64_t bits;
+    /* deviation: misra-c2012-21.15: copying the bytes is the defined way from a number to its bits */
+    /* cppcheck-suppress misra-c2012-21.15 */
     (void)memcpy(&bits, &x, sizeof(bits));
     return (word == 0U) ? (uint32_t)(bits & UINT32_MAX) : (uint32_t)(bits >> 32U);
 #else
     uint32_t bits;
     (void)word; /* there is one */
+    /* deviation: misra-c2012-21.15: as above */
+    /* cppcheck-suppress misra-c2012-21.15 */
     (void)memcpy(&bits, &x, sizeof(bits));
     return bits;
 #endif

@@ -10,17 +10,17 @@
 #define COUNTER_MASK 0x0FU
 #define STAMP_MASK 0x0FU
 #define BYTE_MASK 0xFFUL
-#define FORMAT 1UL
+#define FORMAT 1U
 #define HEAD 3U     /* words before the samples */
 #define ROW_HEAD 3U /* words of a sample before its numbers */
 #define MISSED_MAX 63U
 
 #if HG_REAL_Q31
-#define TYPE 3UL
+#define TYPE 3U
 #elif HG_REAL_F64
-#define TYPE 2UL
+#define TYPE 2U
 #else
-#define TYPE 1UL
+#define TYPE 1U
 #endif
 
 static uint32_t reals_of(const hg_freeze *self)
@@ -108,7 +108,8 @@ static uint32_t word_of_row(const hg_freeze *self, uint32_t older, uint32_t plac
         word = row->candidates;
     } else {
         const uint32_t i = place - ROW_HEAD;
-        word = hg_real_word(self->memory.real[(at * reals_of(self)) + (i / HG_REAL_WORDS)], (uint8_t)(i % HG_REAL_WORDS));
+        const uint32_t number = i / HG_REAL_WORDS;
+        word = hg_real_word(self->memory.real[(at * reals_of(self)) + number], (uint8_t)(i - (number * HG_REAL_WORDS)));
     }
     return word;
 }
@@ -118,7 +119,7 @@ uint32_t hg_freeze_word(const hg_freeze *self, uint32_t place)
     const uint32_t last = hg_freeze_words(self) - 1U;
     uint32_t word;
     if (place == 0U) {
-        word = FORMAT | (TYPE << 8U) | ((uint32_t)self->record << 16U) | ((uint32_t)self->held << 24U);
+        word = FORMAT | ((uint32_t)TYPE << 8U) | ((uint32_t)self->record << 16U) | ((uint32_t)self->held << 24U);
     } else if (place == 1U) {
         word = self->model_hash;
     } else if (place == 2U) {

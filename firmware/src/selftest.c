@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#define SEED 0x2545F491UL
+#define SEED 0x2545F491U
 #define STAMP_MASK 0x0FU
 
 /* Marsaglia, Xorshift RNGs, 2003. */
@@ -28,7 +28,8 @@ static void move(const hg_selftest_config *config, const hg_message *message, ui
     const uint32_t span = (2U * (uint32_t)config->spread) + 1U;
     for (uint8_t g = 0U; g < message->width; g++) {
         const uint32_t place = first + g;
-        const int32_t moved = (int32_t)(draw(random) % span) - (int32_t)config->spread;
+        const uint32_t drawn = draw(random) % span;
+        const int32_t moved = (int32_t)drawn - (int32_t)config->spread;
         const int32_t wrong = ((place == config->signal) && (k >= config->fault)) ? config->size : 0;
         code[g] = clamped(&message->scale[g], config->code[place] + moved + wrong);
     }

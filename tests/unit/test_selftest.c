@@ -1,0 +1,120 @@
+/** @file
+ *  selftest.h: the stored drives of the shipped models, and that a drive with another outcome is seen. */
+#include "support.h"
+
+#include "hullguard/selftest.h"
+
+#include "battery_cell.h"
+#include "cubic_suspension.h"
+#include "openacc.h"
+#include "platoon.h"
+#include "platoon_bank.h"
+#include "quadratic_sensor.h"
+#include "suspension.h"
+#include "suspension_published.h"
+#include "two_state.h"
+
+#define FAULT 24U
+
+#define TESTED(model)                                                                    \
+    {                                                                                    \
+        static hg_##model##_node node;                                                   \
+        (void)memset(&node, 0x5A, sizeof(node));                                         \
+        assert_status(HG_OK, hg_##model##_selftest(&node));                              \
+        assert_status(HG_OK, hg_##model##_selftest(&node)); /* and once more, just so */ \
+        assert_status(HG_OK, hg_##model##_node_start(&node, HG_START_MOVING));           \
+    }
+
+static void shipped_models_pass_theirs(void **state)
+{
+    (void)state;
+    TESTED(platoon)
+    TESTED(platoon_bank)
+    TESTED(openacc)
+    TESTED(suspension)
+    TESTED(suspension_published)
+    TESTED(battery_cell)
+    TESTED(cubic_suspension)
+    TESTED(quadratic_sensor)
+    TESTED(two_state)
+    assert_status(HG_E_ARGUMENT, hg_platoon_selftest(NULL));
+}
+
+static const int32_t rest[HG_PLATOON_SIGNALS];
+static const hg_selftest_config usual = {
+    .how = HG_START_REST, .samples = 30U, .fault = FAULT, .signal = HG_PLATOON_CONTROL1_MPS2, .spread = 3U, .size = 3750, .code = rest};
+static hg_platoon_node platoon;
+
+static hg_selftest_result driven(const hg_selftest_config *config)
+{
+    hg_selftest_result result;
+    assert_status(HG_OK, hg_platoon_node_start(&platoon, config->how));
+    hg_selftest_drive(&platoon.node, config, &result);
+    return result;
+}
+
+static hg_status tested(const hg_selftest_config *config)
+{
+    assert_status(HG_OK, hg_platoon_node_start(&platoon, config->how));
+    return hg_selftest_run(&platoon.node, config);
+}
+
+static void a_drive_is_quiet_and_then_finds_its_fault(void **state)
+{
+    (void)state;
+    hg_selftest_config config = usual;
+    const hg_selftest_result result = driven(&config);
+    assert_true(result.quiet);
+    assert_true(result.found);
+    for (uint8_t i = 0U; i < HG_PLATOON_GROUPS; i++) { /* every frame was good */
+        assert_count(30, hg_node_health(&platoon.node, i)->good);
+    }
+    config.digest = result.digest;
+    assert_status(HG_OK, tested(&config));
+    config.digest ^= 0x100U;
+    assert_status(HG_E_SELFTEST, tested(&config));
+}
+
+static void an_alarm_too_soon_or_none_is_no_success(void **state)
+{
+    (void)state;
+    hg_selftest_config config = usual;
+    config.samples = FAULT;
+    hg_selftest_result result = driven(&config);
+    assert_true(result.quiet && (!result.found));
+    config.digest = result.digest;
+    assert_status(HG_E_SELFTEST, tested(&config));
+    config.samples = 30U;
+    config.fault = 30U;
+    config.spread = 127U;
+    int32_t far[HG_PLATOON_SIGNALS] = {0, 0, 0, 100000, -100000, 0}; /* beyond the range: sent as its ends */
+    config.code = far;
+    result = driven(&config);
+    assert_true((!result.quiet) && result.found);
+    config.digest = result.digest;
+    assert_status(HG_E_SELFTEST, tested(&config));
+}
+
+static void another_table_or_instruction_is_another_digest(void **state)
+{
+    (void)state;
+    const uint32_t good = driven(&usual).digest;
+    for (uint8_t i = 0U; i < 3U; i++) { /* as a table would do that says so */
+        hg_selftest_config config = usual;
+        config.spread = (i == 0U) ? 4U : 3U;
+        config.size = (i == 1U) ? 3751 : 3750;
+        config.fault = (i == 2U) ? (FAULT + 1U) : FAULT;
+        assert_true(driven(&config).digest != good);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shipped_models_pass_theirs),
+        cmocka_unit_test(a_drive_is_quiet_and_then_finds_its_fault),
+        cmocka_unit_test(an_alarm_too_soon_or_none_is_no_success),
+        cmocka_unit_test(another_table_or_instruction_is_another_digest),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
