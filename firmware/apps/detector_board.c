@@ -154,8 +154,8 @@ static uint32_t begin(app *self, int key)
         hg_board_say("no CAN controller\n");
         return EXIT_BUS;
     }
-    if (hg_platoon_node_start(&storage, self->timed ? HG_START_MOVING : HG_START_REST) != HG_OK) {
-        hg_board_say("model does not start: generate its tables again\n");
+    if ((hg_platoon_selftest(&storage) != HG_OK) || (hg_platoon_node_start(&storage, self->timed ? HG_START_MOVING : HG_START_REST) != HG_OK)) {
+        hg_board_say("model fails its self-test, or does not start: generate its tables again\n");
         return EXIT_FAILED;
     }
     if (self->timed) { /* a bus that stays silent has to be reported from the start */

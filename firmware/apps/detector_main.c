@@ -79,7 +79,7 @@ int main(void)
     static app self;
     hg_can_frame frame;
     uint64_t at_us;
-    if ((hg_board_start(&self.board) != HG_OK) || (hg_platoon_node_start(&self.detector, HG_START_MOVING) != HG_OK)) {
+    if ((hg_board_start(&self.board) != HG_OK) || (hg_platoon_selftest(&self.detector) != HG_OK) || (hg_platoon_node_start(&self.detector, HG_START_MOVING) != HG_OK)) {
         return 1;
     }
     self.deadline_us = hg_hal_now_us(&self.board) + PERIOD_US + SLACK_US;

@@ -30,9 +30,9 @@
 #define BEHIND_MAX 255U            /* overdue samples caught up with; by then every group is stale (hold.h) */
 #define PAUSE_FIRST_US 250U        /* of a send's backoff, doubled each time */
 #define PAUSE_ALL_MAX_US 50000U    /* longest time one frame is offered to a bus that has no room */
-#define FILTERS_MAX (HG_FUSION_SENSORS_MAX + 1U)
+#define FILTERS_MAX (HG_FUSION_SENSORS_MAX + 1U) /* every sensor and the tick; of a detector every group, and requests */
 
-_Static_assert(HG_GROUPS_MAX <= FILTERS_MAX, "a filter for every group");
+_Static_assert((HG_GROUPS_MAX + 1U) <= FILTERS_MAX, "a filter for every group, and for requests");
 _Static_assert(FILTERS_MAX <= HG_SOCKETCAN_FILTERS_MAX, "a filter for every sensor and the tick");
 
 typedef struct {
@@ -259,16 +259,25 @@ static int refuse_bus(const app *self, hg_status status)
     return EXIT_BUS;
 }
 
-/* Only the groups' frames are of interest: the kernel drops all others. */
+static hg_hal_filter filter_of(const hg_message *message)
+{
+    return (hg_hal_filter){.id = message->id, .mask = HG_CAN_ID_EXTENDED, .flags = message->flags & HG_CAN_EXTENDED};
+}
+
+/* Only the groups' frames and requests are of interest: the kernel drops all others. */
 static hg_status open_bus(app *self)
 {
     hg_hal_filter filter[FILTERS_MAX];
-    const uint8_t links = app_unit_links(&self->options.unit);
-    for (uint8_t i = 0U; i < links; i++) {
-        const hg_message *message = app_unit_message(&self->options.unit, i);
-        filter[i] = (hg_hal_filter){.id = message->id, .mask = HG_CAN_ID_EXTENDED, .flags = message->flags & HG_CAN_EXTENDED};
+    const hg_message *request = app_unit_request(&self->options.unit);
+    uint8_t count = app_unit_links(&self->options.unit);
+    for (uint8_t i = 0U; i < count; i++) {
+        filter[i] = filter_of(app_unit_message(&self->options.unit, i));
     }
-    const hg_socketcan_options wanted = {.filters = filter, .filter_count = links, .stop_on_signal = true};
+    if (request != NULL) {
+        filter[count] = filter_of(request);
+        count++;
+    }
+    const hg_socketcan_options wanted = {.filters = filter, .filter_count = count, .stop_on_signal = true};
     const hg_status status = hg_socketcan_open(&self->can, self->options.interface, &wanted);
     if (status == HG_OK) {
         self->hal = hg_socketcan_hal(&self->can);
@@ -305,6 +314,15 @@ static bool finished(const app *self)
     return (self->options.samples > 0U) && (self->steps >= self->options.samples);
 }
 
+/* What answers requests for the freeze frame. */
+static void answer(app *self)
+{
+    hg_can_frame frame;
+    while (app_unit_freeze(&self->options.unit, &frame) == HG_OK) {
+        send_frame(self, &frame);
+    }
+}
+
 static void make_steps(app *self)
 {
     hg_can_frame frame[APP_FRAMES_MAX];
@@ -317,6 +335,7 @@ static void make_steps(app *self)
         }
         self->steps++;
     }
+    answer(self);
 }
 
 /* Has this node fallen behind its sender by more samples than a stamp can tell? Frames that waited for a stopped process carry the time of
@@ -504,6 +523,12 @@ static int start(app *self)
     const hg_status opened = open_bus(self);
     if (opened != HG_OK) {
         return refuse_bus(self, opened);
+    }
+    const hg_status tested = app_unit_selftest(&self->options.unit);
+    if (tested != HG_OK) {
+        (void)fprintf(stderr, "detector_node: model '%s' fails its self-test (status %d): tables, library or processor are not as the model was designed with; "
+                              "generate its tables again and build anew\n", app_unit_name(&self->options.unit), (int)tested);
+        return EXIT_FAILED;
     }
     const hg_status started = app_unit_start(&self->options.unit, self->options.how);
     if (started != HG_OK) {

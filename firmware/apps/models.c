@@ -24,6 +24,10 @@
 #define STORAGE(name, NAME)                                                     \
     static hg_##name##_node name##_node;                                        \
     static const char *const name##_group[] = HG_##NAME##_GROUP_NAMES;          \
+    static hg_status name##_selftest(void)                                      \
+    {                                                                           \
+        return hg_##name##_selftest(&name##_node);                              \
+    }                                                                           \
     static hg_status name##_start(hg_node **node, hg_start how)                 \
     {                                                                           \
         *node = &name##_node.node;                                              \
@@ -31,7 +35,7 @@
     }
 MODELS(STORAGE)
 
-#define ENTRY(name, NAME) {#name, &hg_##name##_config, name##_group, HG_##NAME##_SAMPLE_TIME_US, name##_start},
+#define ENTRY(name, NAME) {#name, &hg_##name##_config, name##_group, HG_##NAME##_SAMPLE_TIME_US, name##_selftest, name##_start},
 static const app_model models[] = {MODELS(ENTRY)};
 
 const app_model *app_model_at(size_t index)
@@ -46,6 +50,11 @@ const app_model *app_model_find(const char *name)
         i++;
     }
     return app_model_at(i);
+}
+
+hg_status app_model_selftest(const app_model *model)
+{
+    return model->selftest();
 }
 
 hg_status app_model_start(const app_model *model, hg_node **node, hg_start how)

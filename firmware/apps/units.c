@@ -77,6 +77,17 @@ hg_bus_health app_unit_bus(const app_unit *self, const hg_verdict *verdict, uint
     return (hg_bus_health)(((unsigned)verdict->bus >> (2U * (i % 8U))) & 0x3U);
 }
 
+const hg_message *app_unit_request(const app_unit *self)
+{
+    return ((self->model != NULL) && (self->model->config->freeze != NULL)) ? self->model->config->freeze->request : NULL;
+}
+
+hg_status app_unit_selftest(const app_unit *self)
+{
+    const hg_status status = (self->model != NULL) ? app_model_selftest(self->model) : HG_E_EMPTY;
+    return (status == HG_E_EMPTY) ? HG_OK : status; /* no drive was found for this model */
+}
+
 hg_status app_unit_start(app_unit *self, hg_start how)
 {
     return (self->model != NULL) ? app_model_start(self->model, &self->node, how) : self->fusion->start(&self->tracker, how);
@@ -107,6 +118,11 @@ uint8_t app_unit_report(const app_unit *self, const hg_verdict *verdict, bool re
         frames = (uint8_t)(frames + ((hg_tracker_estimate(self->tracker, j, &frame[frames]) == HG_OK) ? 1U : 0U));
     }
     return frames;
+}
+
+hg_status app_unit_freeze(const app_unit *self, hg_can_frame *frame)
+{
+    return (self->model != NULL) ? hg_node_freeze(self->node, frame) : HG_E_EMPTY;
 }
 
 void app_unit_expect(const app_unit *self, uint32_t samples)

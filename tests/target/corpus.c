@@ -3,7 +3,8 @@
  *  that closes samples, outages. A hash is printed over every verdict, every report and the bits of every value, radius, r and J. float32
  *  arithmetic is exact to the bit by IEEE 754 wherever no product is fused into a sum and no subnormal number is flushed to zero, and fixed point
  *  is integers, so that every processor must print the same. To have subnormal numbers, and in fixed point such as do not fit, the residual
- *  generators run once more on signals of such a size. Then the fusion filter (corpus_fusion.c)
+ *  generators run once more on signals of such a size. Before each drive the model's self-test (selftest.h), whose outcome was computed on the host, and
+ *  the digest of its tables (digest.h), taken in parts. Then the fusion filter (corpus_fusion.c)
  *  and the polynomial filter (corpus_polynomial.c). No C library is needed. */
 
 #include "console.h"
@@ -24,6 +25,7 @@
 #define WALK 256UL    /* samples of random walk, then as many of standstill */
 #define GROUPS 8U
 #define SIGNALS 32U
+#define NUMBERS 100UL /* of the tables at a time */
 #define FNV_BASIS 0xCBF29CE484222325ULL
 #define FNV_PRIME 0x100000001B3ULL
 
@@ -42,6 +44,8 @@ typedef struct {
     const hg_node_config   *config;
     const hg_sender_config *sender;
     bool                  (*start)(hg_node **node, hg_sender **sender);
+    hg_status             (*selftest)(void);
+    hg_status             (*check)(hg_digest *walk, uint32_t numbers);
 } subject;
 
 typedef struct {
@@ -77,14 +81,19 @@ static union {
         *sender = sender_memory.model.sender;                                                                    \
         return (hg_##model##_node_start(&node_memory.model, HG_START_MOVING) == HG_OK) &&                        \
                (hg_##model##_senders_start(&sender_memory.model) == HG_OK);                                      \
+    }                                                                                                            \
+    static hg_status model##_selftest(void)                                                                      \
+    {                                                                                                            \
+        return hg_##model##_selftest(&node_memory.model);                                                        \
     }
 START(platoon)
 START(platoon_bank)
 START(openacc)
 
-static const subject subjects[] = {{"platoon", &hg_platoon_config, hg_platoon_sender, platoon_start},
-                                   {"platoon_bank", &hg_platoon_bank_config, hg_platoon_bank_sender, platoon_bank_start},
-                                   {"openacc", &hg_openacc_config, hg_openacc_sender, openacc_start}};
+static const subject subjects[] = {
+    {"platoon", &hg_platoon_config, hg_platoon_sender, platoon_start, platoon_selftest, hg_platoon_check},
+    {"platoon_bank", &hg_platoon_bank_config, hg_platoon_bank_sender, platoon_bank_start, platoon_bank_selftest, hg_platoon_bank_check},
+    {"openacc", &hg_openacc_config, hg_openacc_sender, openacc_start, openacc_selftest, hg_openacc_check}};
 
 /* ---- what is printed ---- */
 
@@ -294,6 +303,23 @@ static void run_extremes(drive *d)
     }
 }
 
+/* What the model says of itself, and whether it holds here. */
+static bool tested(const subject *of)
+{
+    hg_digest walk;
+    hg_digest_start(&walk);
+    hg_status status = of->check(&walk, NUMBERS);
+    while (status == HG_E_BUSY) {
+        status = of->check(&walk, NUMBERS);
+    }
+    const hg_status drive = of->selftest();
+    print(of->name);
+    print_hex(" digest ", walk.crc, 8U);
+    print((status == HG_OK) ? " good" : " wrong");
+    print((drive == HG_OK) ? " self-test passed\n" : " self-test failed\n");
+    return (status == HG_OK) && (drive == HG_OK);
+}
+
 static bool run(const subject *of)
 {
     drive d = {.subject = of, .random = 0x2545F491UL, .hash = FNV_BASIS};
@@ -326,7 +352,7 @@ int main(void)
 {
     bool good = true;
     for (size_t i = 0U; i < (sizeof(subjects) / sizeof(subjects[0])); i++) {
-        good = run(&subjects[i]) && good;
+        good = tested(&subjects[i]) && run(&subjects[i]) && good;
     }
 #if !HG_REAL_Q31
     const uint64_t fusion = corpus_fusion(SAMPLES);
