@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0x922B7D5B */
 #include "battery_pack.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group cells: inner_degc, outer_degc ---- */
@@ -907,7 +909,7 @@ static const hg_message status = {.id = 0x591UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_battery_pack_config = {
     .detector = &detector, .message = message, .closing = 3U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_BATTERY_PACK_HASH,
+    .heartbeat = 10U, .model_hash = HG_BATTERY_PACK_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_battery_pack_sender[HG_BATTERY_PACK_GROUPS] = {
@@ -917,11 +919,27 @@ const hg_sender_config hg_battery_pack_sender[HG_BATTERY_PACK_GROUPS] = {
     {.message = &message[3], .trigger = &trigger[3]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_battery_pack_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_battery_pack_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_BATTERY_PACK_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_battery_pack_node_start(hg_battery_pack_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_battery_pack_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL, .bank = NULL,
                      .alarm = self->alarm, .code = self->code, .codes = 12U, .real = self->real, .reals = 348UL,
@@ -940,4 +958,24 @@ hg_status hg_battery_pack_senders_start(hg_battery_pack_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_battery_pack_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_Q31
+#define SELFTEST 0x727FD9F9UL
+#elif HG_REAL_F64
+#define SELFTEST 0xE13E321EUL
+#elif HG_REAL_F32
+#define SELFTEST 0x1CF2E7AFUL
+#endif
+
+hg_status hg_battery_pack_selftest(hg_battery_pack_node *self)
+{
+    static const int32_t code[HG_BATTERY_PACK_SIGNALS] = {6000, 5870, 4800, 2000, 5003, 1237}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 0U, .spread = 64U,
+        .size = -1625, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_battery_pack_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }

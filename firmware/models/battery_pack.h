@@ -6,6 +6,7 @@
 #ifndef HULLGUARD_MODEL_BATTERY_PACK_H
 #define HULLGUARD_MODEL_BATTERY_PACK_H
 
+#include "hullguard/digest.h"
 #include "hullguard/node.h"
 
 #if HG_GROUPS_MAX < 4U
@@ -57,6 +58,14 @@ extern "C" {
 #define HG_BATTERY_PACK_FAULTS 5U
 #define HG_BATTERY_PACK_SAMPLE_TIME_US 10000000UL /* microseconds between two closing frames */
 #define HG_BATTERY_PACK_HASH 0x922B7D5BUL /* changes with any number of the tables */
+/* Digest of the tables, for each number type (digest.h). */
+#if HG_REAL_Q31
+#define HG_BATTERY_PACK_DIGEST 0x298BBEC8UL
+#elif HG_REAL_F64
+#define HG_BATTERY_PACK_DIGEST 0xD9D3F894UL
+#elif HG_REAL_F32
+#define HG_BATTERY_PACK_DIGEST 0xDB599B43UL
+#endif
 
 /* Places in the signal vector, group after group. */
 enum {
@@ -114,11 +123,30 @@ typedef struct {
     hg_real     real[348];
 } hg_battery_pack_node;
 
+#if HG_WITH_DIGEST
+/** Take the next numbers of the model's tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+ *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
+ *  @retval HG_OK        that was the last one, and all is as generated
+ *  @retval HG_E_BUSY    there are more
+ *  @retval HG_E_DIGEST  that was the last one, and something is not */
+hg_status hg_battery_pack_check(hg_digest *walk, uint32_t numbers);
+#endif
+
+/** Self-test of tables, library and processor (selftest.h) in the node's own memory, before its start: a stored drive, fault-free and then with a fault
+ *  that must be found, every bit of whose outcome was computed when the model was designed.
+ *  @param[out] self  memory, owned by the caller; not started afterwards
+ *  @retval HG_OK          all as it was then
+ *  @retval HG_E_SELFTEST  something is not
+ *  @retval HG_E_EMPTY     for this model no drive was found: nothing was tested
+ *  @retval HG_E_ARGUMENT, HG_E_CONFIG, HG_E_DIGEST  as the start */
+hg_status hg_battery_pack_selftest(hg_battery_pack_node *self);
+
 /** Start a detector node; self->node is then ready for hg_node_receive().
  *  @param[out] self  memory, owned by the caller  @param[in] how  what is known of the plant's motion
  *  @retval HG_OK          ready
  *  @retval HG_E_ARGUMENT  a null pointer
- *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library */
+ *  @retval HG_E_CONFIG    tables contradict one another: these tables are not of this library
+ *  @retval HG_E_DIGEST    tables are not as they were generated */
 hg_status hg_battery_pack_node_start(hg_battery_pack_node *self, hg_start how);
 
 /* Memory of all senders of the model, for whoever plays the plant; an ECU that is one of them needs one hg_sender only. */

@@ -5,6 +5,8 @@
  *  Model hash, as in the status frame: 0xAED7E82D */
 #include "dc_motor.h"
 
+#include "hullguard/selftest.h"
+
 #include <stddef.h>
 
 /* ---- Group shaft: speed_radps ---- */
@@ -1120,7 +1122,7 @@ static const hg_message status = {.id = 0x541UL, .flags = 0U, .length = 8U, .wid
 
 const hg_node_config hg_dc_motor_config = {
     .detector = &detector, .message = message, .closing = 2U, .verdict = &verdict, .status = &status,
-    .heartbeat = 10U, .model_hash = HG_DC_MOTOR_HASH,
+    .heartbeat = 10U, .model_hash = HG_DC_MOTOR_HASH, .freeze = NULL,
 };
 
 const hg_sender_config hg_dc_motor_sender[HG_DC_MOTOR_GROUPS] = {
@@ -1129,11 +1131,27 @@ const hg_sender_config hg_dc_motor_sender[HG_DC_MOTOR_GROUPS] = {
     {.message = &message[2], .trigger = &trigger[2]},
 };
 
+#if HG_WITH_DIGEST
+hg_status hg_dc_motor_check(hg_digest *walk, uint32_t numbers)
+{
+    const hg_status result = hg_digest_node(walk, &hg_dc_motor_config, numbers);
+    return ((result == HG_OK) && (walk->crc != HG_DC_MOTOR_DIGEST)) ? HG_E_DIGEST : result;
+}
+#endif
+
 hg_status hg_dc_motor_node_start(hg_dc_motor_node *self, hg_start how)
 {
     if (self == NULL) {
         return HG_E_ARGUMENT;
     }
+#if HG_WITH_DIGEST
+    hg_digest walk;
+    hg_digest_start(&walk);
+    const hg_status checked = hg_dc_motor_check(&walk, UINT32_MAX);
+    if (checked != HG_OK) {
+        return checked;
+    }
+#endif
     const hg_node_memory memory = {
         .detector = {.hold = self->hold, .predict = NULL, .residual = self->residual, .hull = self->hull, .zonotope = NULL,
                      .bank = self->bank,
@@ -1153,4 +1171,24 @@ hg_status hg_dc_motor_senders_start(hg_dc_motor_senders *self)
         result = hg_sender_start(&self->sender[i], &hg_dc_motor_sender[i], &self->code[first[i]]);
     }
     return result;
+}
+
+/* what the self-test's drive must give */
+#if HG_REAL_Q31
+#define SELFTEST 0x9D3D9EEAUL
+#elif HG_REAL_F64
+#define SELFTEST 0x2044E674UL
+#elif HG_REAL_F32
+#define SELFTEST 0xA566C16AUL
+#endif
+
+hg_status hg_dc_motor_selftest(hg_dc_motor_node *self)
+{
+    static const int32_t code[HG_DC_MOTOR_SIGNALS] = {0, 0, 0, 0}; /* at rest */
+    static const hg_selftest_config drive = {
+        .how = HG_START_REST, .samples = 25U, .fault = 24U, .signal = 0U, .spread = 8U,
+        .size = 2500, .code = code, .digest = SELFTEST,
+    };
+    const hg_status result = hg_dc_motor_node_start(self, drive.how);
+    return (result == HG_OK) ? hg_selftest_run(&self->node, &drive) : result;
 }
