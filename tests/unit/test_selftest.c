@@ -10,6 +10,7 @@
 #include "platoon.h"
 #include "platoon_bank.h"
 #include "quadratic_sensor.h"
+#include "small_model.h"
 #include "suspension.h"
 #include "suspension_published.h"
 #include "two_state.h"
@@ -108,6 +109,35 @@ static void another_table_or_instruction_is_another_digest(void **state)
     }
 }
 
+#define P22(list) {.profile = HG_E2E_P22, .data_ids = (list), .crc = 0U, .counter = 8U, .stamp = 12U, .limits = &hg_e2e_limits_default}
+
+/* A sender that keeps silent for a sample after each frame speaks every second one, and nothing of it counts as lost. */
+static void a_silent_sender_is_let_be_silent(void **state)
+{
+    (void)state;
+    static const uint8_t ids[HG_E2E_IDS] = {7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U};
+    static const hg_e2e_config rules = P22(ids);
+    static const hg_field fields[2] = {{16U, 16U, HG_FIELD_SIGNED}, {32U, 16U, HG_FIELD_SIGNED}};
+    static const hg_message messages[SM_GROUPS] = {{.id = 0x101U, .length = 6U, .width = 2U, .field = fields, .scale = sm_scale, .e2e = &rules},
+                                                   {.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .e2e = &rules}};
+    static const hg_message own = {.id = 0x200U, .length = 8U, .e2e = &rules};
+    static const hg_node_config config = {.detector = &sm_detector, .message = messages, .closing = 1U, .verdict = &own, .status = &own, .heartbeat = 5U};
+    static const int32_t still[SM_SIGNALS];
+    static const hg_selftest_config drive = {.how = HG_START_REST, .samples = 20U, .fault = 11U, .signal = 0U, .spread = 0U, .size = 2000, .code = still};
+    static sm_storage storage;
+    hg_node node;
+    hg_link link[SM_GROUPS];
+    int32_t closing[2];
+    hg_selftest_result result;
+    const hg_node_memory memory = {.detector = sm_memory(&storage), .link = link, .closing = closing};
+    assert_status(HG_OK, hg_node_start(&node, &config, &memory, HG_START_REST));
+    hg_selftest_drive(&node, &drive, &result);
+    assert_true(result.quiet && result.found);
+    assert_count(10, link[0].health.good);
+    assert_count(20, link[1].health.good);
+    assert_count(0, link[0].health.lost);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -115,6 +145,7 @@ int main(void)
         cmocka_unit_test(a_drive_is_quiet_and_then_finds_its_fault),
         cmocka_unit_test(an_alarm_too_soon_or_none_is_no_success),
         cmocka_unit_test(another_table_or_instruction_is_another_digest),
+        cmocka_unit_test(a_silent_sender_is_let_be_silent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
