@@ -121,7 +121,7 @@ static void another_count_is_refused_by_the_detector(void **state)
     begin(&t);
     t.detector.generators--;
     t.detector.banks++; /* as many that are judged */
-    t.detector.residuals -= HG_ONLY_RESIDUALS - 1U;
+    t.detector.residuals = (uint16_t)(t.detector.residuals - (HG_ONLY_RESIDUALS - 1U));
     assert_status(HG_E_CONFIG, start_of(&t.detector));
 }
 
