@@ -154,6 +154,8 @@ void proof_e2e_sequence(void)
     hg_e2e_config config = any_config(ids, &hg_e2e_limits_default);
     config.ignore = any_u8();
     const uint32_t modulus = hg_e2e_modulus(&config);
+    const uint32_t turns[] = {0U, 1U, 15U, 16U, 256U, 15U, 16U}; /* of NONE, P01, P02, P05, P11, P22 */
+    prove(modulus == turns[config.profile], "the values of its counter");
     const uint32_t a = any_u32();
     const uint32_t b = any_u32();
     assume((a < 65536U) && (b < 65536U));

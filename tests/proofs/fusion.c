@@ -57,12 +57,12 @@ static hg_fusion_config any_config(tables *t)
 
 /** A filter takes any measurements, stamps and counters, and keeps to its memory: statuses of the closed lists, as many samples held as it has room for; a value twice, of a sample that
  *  is not held, or out of range is refused.
- *  STATES states, SENSORS sensors, DEPTH past samples; any tables that hg_fusion_valid() accepts; SAMPLES samples after a start, a frame each, and whatever a frame can say of the past.
+ *  STATES states, SENSORS sensors, DEPTH past samples, counters of up to MODULUS values; any tables that hg_fusion_valid() accepts; SAMPLES samples after a start, a frame each, and whatever a frame can say of the past.
  *  @proves hg_fusion_start hg_fusion_valid hg_fusion_reset hg_fusion_open hg_fusion_due hg_fusion_receive hg_fusion_unwrap hg_fusion_local hg_fusion_number hg_fusion_recall
  *  @proves hg_fusion_close hg_fusion_exclude hg_fusion_alive
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run check real=f32 unwind=18 limit=60 STATES=1U SENSORS=1U DEPTH=1U SAMPLES=1U
- *  @run deep real=f32 unwind=18 limit=7200 STATES=2U SENSORS=2U DEPTH=2U SAMPLES=2U */
+ *  @run check real=f32 unwind=4 limit=60 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=1U SAMPLES=1U MODULUS=4U ANY_NUMBERS
+ *  @run deep real=f32 unwind=5 limit=7200 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:17 STATES=2U SENSORS=2U DEPTH=2U SAMPLES=2U MODULUS=16U */
 void proof_fusion(void)
 {
     tables t;
@@ -74,7 +74,7 @@ void proof_fusion(void)
     prove((started == HG_OK) == hg_fusion_valid(&config), "what is valid starts");
     prove((hg_fusion_start(NULL, &config, &memory) == HG_E_ARGUMENT) && (hg_fusion_start(&self, NULL, &memory) == HG_E_ARGUMENT) && (hg_fusion_start(&self, &config, NULL) == HG_E_ARGUMENT),
           "null pointers");
-    assume(started == HG_OK);
+    assume((started == HG_OK) && (config.modulus <= MODULUS));
     prove(t.select[0] < STATES, "a state that there is");
     hg_real y;
     hg_real period;
@@ -110,8 +110,8 @@ void proof_fusion(void)
 /** A consistency test keeps to its memory and blames only sensors that there are, whatever the filter's records are.
  *  STATES states, SENSORS sensors, ONSETS hypotheses; any numbers and records; one sample in any state.
  *  @proves hg_consistency_start hg_consistency_reset hg_consistency_step
- *  @run check real=f32 unwind=18 limit=30 STATES=2U SENSORS=2U ONSETS=2U
- *  @run deep real=f32 unwind=18 limit=3600 STATES=3U SENSORS=3U ONSETS=3U */
+ *  @run check real=f32 unwind=6 limit=30 STATES=1U SENSORS=2U ONSETS=1U ANY_NUMBERS
+ *  @run deep real=f32 unwind=10 limit=3600 STATES=3U SENSORS=3U ONSETS=3U */
 void proof_consistency(void)
 {
     tables t;

@@ -141,7 +141,7 @@ void proof_residual_step(void)
 }
 
 #if !HG_REAL_Q31
-/** Observer and filter in series: the filter reads what the observer says, and neither moves when the observer refuses.
+/** Observer and filter in series: the filter reads what the observer says (RESIDUALS and SIGNALS are equal), and neither moves when the observer refuses.
  *  ORDER states and RESIDUALS residuals each; any tables and numbers.
  *  @proves hg_residual_pair_step
  *  @run check real=f32 unwind=9 limit=30 ORDER=2U WIDTH=2U RESIDUALS=2U SIGNALS=2U */
@@ -151,7 +151,10 @@ void proof_residual_pair(void)
     hg_real B[ORDER * WIDTH];
     hg_real C[RESIDUALS * ORDER];
     hg_real D[RESIDUALS * WIDTH];
-    uint8_t signal[WIDTH] = {0U, 1U};
+    uint8_t signal[WIDTH];
+    for (uint8_t g = 0U; g < WIDTH; g++) {
+        signal[g] = any_u8_in(0U, SIGNALS - 1U);
+    }
     hg_real memory[HG_RESIDUAL_REALS(ORDER, WIDTH)];
     hg_real more[HG_RESIDUAL_REALS(ORDER, WIDTH)];
     const hg_residual_config config = {.order = ORDER, .residuals = RESIDUALS, .width = WIDTH, .signal = signal,

@@ -17,15 +17,16 @@
  *  All messages of the model, any codes, counter and stamp.
  *  @proves hg_frame_pack hg_frame_unpack hg_frame_valid hg_e2e_protect hg_e2e_check
  *  @without conversion: bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=30 MODEL=platoon
- *  @run check real=f32 unwind=65 limit=30 MODEL=openacc
- *  @run check real=f32 unwind=65 limit=30 MODEL=suspension
- *  @run check real=f32 unwind=65 limit=30 MODEL=battery_cell
- *  @run check real=q31 unwind=65 limit=30 MODEL=two_state
- *  @run deep real=q31 unwind=65 limit=600 MODEL=platoon_bank
- *  @run deep real=f32 unwind=65 limit=600 MODEL=quadratic_sensor
- *  @run deep real=f32 unwind=65 limit=600 MODEL=cubic_suspension
- *  @run deep real=f32 unwind=65 limit=600 MODEL=suspension_published */
+ *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=platoon
+ *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=openacc
+ *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=suspension
+ *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=battery_cell
+ *  @run check real=q31 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=platoon
+ *  @run deep real=q31 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=platoon_bank
+ *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=two_state
+ *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=quadratic_sensor
+ *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=cubic_suspension
+ *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=suspension_published */
 void proof_models_round(void)
 {
     const hg_node_config *config = &JOIN(hg_, MODEL, _config);

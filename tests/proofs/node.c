@@ -21,7 +21,7 @@ typedef struct {
  *  The platoon's tables; FRAMES frames of any identifier, kind, length and bytes after a start, overdue, expect and outage among them.
  *  @proves hg_node_start hg_node_receive hg_node_expect hg_node_overdue hg_node_outage hg_node_step hg_node_report hg_node_health hg_verdict_read
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 FRAMES=1U
+ *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 FRAMES=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=65 limit=7200 hg_detector_start.0:153 hg_ring_reset.0:109 FRAMES=3U */
 void proof_node_receive(void)
 {
@@ -115,7 +115,7 @@ void proof_verdict_round(void)
 /** A detector takes any codes of any group, losses and restarts: no undefined behaviour; codes that are none are refused and count as a loss; its finding is one that there is.
  *  The platoon's tables; a start and SAMPLES samples.
  *  @proves hg_detector_start hg_detector_restart hg_detector_receive hg_detector_lose hg_detector_step hg_detector_reals hg_detector_sums
- *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 SAMPLES=1U
+ *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 SAMPLES=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=65 limit=7200 hg_detector_start.0:153 hg_ring_reset.0:109 SAMPLES=3U */
 void proof_detector_step(void)
 {

@@ -70,4 +70,14 @@ static inline size_t proof_index(int64_t i, size_t length)
     return (size_t)i;
 }
 
+/* Products and quotients. With ANY_NUMBERS those of floating-point numbers are any: what is proven then holds whatever they are, and the solver is spared them. Memory safety,
+   and that what enters a state is finite, hold that way; values do not. */
+#ifdef ANY_NUMBERS
+#define PROOF_TIMES(a, b) _Generic((a) * (b), float: nondet_float(), double: nondet_double(), default: (a) * (b))
+#define PROOF_OVER(a, b) _Generic((a) / (b), float: nondet_float(), double: nondet_double(), default: (a) / (b))
+#else
+#define PROOF_TIMES(a, b) ((a) * (b))
+#define PROOF_OVER(a, b) ((a) / (b))
+#endif
+
 #endif

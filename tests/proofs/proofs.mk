@@ -8,9 +8,9 @@ PROOFS :=
 CHECK_PARTS += proofs
 DEEP_PARTS += proofs-deep
 proofs: $(CBMC)/bin/cbmc ## proofs by bounded model checking: no undefined behaviour, and what the headers promise (PROOFS=hold chooses)
-	@$(PY) tests/proofs/proofs.py $(JOBS:%=--jobs %) $(PROOFS)
+	@BUILD=$(BUILD) $(PY) tests/proofs/proofs.py $(JOBS:%=--jobs %) $(PROOFS)
 proofs-deep: $(CBMC)/bin/cbmc ## the same at larger sizes, which takes hours
-	@$(PY) tests/proofs/proofs.py --deep $(JOBS:%=--jobs %) $(PROOFS)
+	@BUILD=$(BUILD) $(PY) tests/proofs/proofs.py --deep $(JOBS:%=--jobs %) $(PROOFS)
 $(CBMC)/bin/cbmc: tests/proofs/cbmc.sh
 	@sh $< $(CBMC)
 	@touch $@

@@ -3,7 +3,7 @@
 A proof is a C function proof_X(), and what the comment before it says:
 
     @proves FUNCTION ..     of the library; every public function must be in some proof, or in exceptions.txt with a reason
-    @run check|deep real=f32|f64|q31 unwind=N limit=SECONDS (of processor time) [loop:N ..] [NAME=NUMBER ..] [NAME ..]    once each; sizes are macros of the proof, HG_* of the library
+    @run check|deep real=f32|f64|q31 unwind=N limit=SECONDS [LOOP:N ..] [NAME=NUMBER ..]    once each; processor time; sizes are macros: of the proof, HG_* of the library; ANY_NUMBERS: proof.h
     @with CHECK ..          also this check of CBMC
     @without CHECK: WHY     without it
 
@@ -15,7 +15,6 @@ it says nothing: no property, or a reach() that no input comes to.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import resource
@@ -24,7 +23,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import ceil
@@ -33,14 +32,17 @@ from threading import Lock
 
 from instrument import InstrumentError, instrument, nodes, parse, text_of
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "tests/proofs"
-BUILD = ROOT / "build/proofs"
-RESULTS = ROOT / "build/results"
-TOOLS = ROOT / "build/tools/cbmc/bin"
+BUILD = ROOT / os.environ.get("BUILD", "build") / "proofs"
+TOOLS = BUILD.parent / "tools/cbmc/bin"
 MEMORY = 8 << 30  # of one run, bytes
 
 CHECKS = ("bounds", "pointer", "pointer-overflow", "div-by-zero", "signed-overflow", "unsigned-overflow", "conversion", "undefined-shift")
+LIBRARY = ("HG_", "ANY_NUMBERS")  # macros that the library is compiled with, too
 SHOWN = 8  # of what is wrong with one run
 REACH = "reachable: "
 PROPERTY = re.compile(r"^\[([^\]]+)\] line \d+ (.*): (SUCCESS|FAILURE|UNKNOWN|ERROR)$", re.MULTILINE)
@@ -65,7 +67,7 @@ class Run:
     @property
     def library(self) -> tuple[str, ...]:
         """What the library is compiled with."""
-        return (f"HG_REAL_{self.real.upper()}=1", *(d for d in self.defines if d.startswith("HG_")))
+        return (f"HG_REAL_{self.real.upper()}=1", *(d for d in self.defines if d.startswith(LIBRARY)))
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,6 @@ class Outcome:
     run: Run
     seconds: float
     properties: int
-    asserted: int
     problems: tuple[str, ...] = field(default=())
 
     @property
@@ -239,7 +240,7 @@ def command_of(proof: Proof, run: Run) -> list[str]:
     folder = BUILD / "run" / "-".join((proof.source.stem, run.real, *(d.replace("=", "") for d in run.defines)))
     with _compiling:
         objects = library_of(run.library)
-        own = [d for d in run.defines if not d.startswith("HG_")]
+        own = [d for d in run.defines if not d.startswith(LIBRARY)]
         ones = [f"{size}=1U" for size in proof.others if not any(d.startswith(f"{size}=") for d in own)]
         compile_goto([proof.source], folder / "proof.o", (*run.library, *own, *ones))
         compile_goto([folder / "proof.o", *objects], folder / "all.goto", (), link=True)
@@ -251,13 +252,13 @@ def command_of(proof: Proof, run: Run) -> list[str]:
     ]  # fmt: skip
 
 
-def judge(output: str) -> tuple[int, int, list[str]]:
-    """Properties, those among them that the proof states itself, and what is wrong."""
+def judge(output: str) -> tuple[int, list[str]]:
+    """Properties, and what is wrong."""
     properties = PROPERTY.findall(output)
     total = TOTAL.search(output)
     problems = []
     if total is None or int(total[2]) != len(properties):
-        return 0, 0, ["its output cannot be read: " + (output.strip().splitlines() or ["nothing"])[-1]]
+        return 0, ["its output cannot be read: " + (output.strip().splitlines() or ["nothing"])[-1]]
     reaches = [status for _, text, status in properties if text.startswith(REACH)]
     checked = [(name, text, status) for name, text, status in properties if not text.startswith(REACH)]
     problems += [f"no input comes to it, the assumptions contradict one another: {text}" for _, text, status in properties if text.startswith(REACH) and status != "FAILURE"]
@@ -267,29 +268,27 @@ def judge(output: str) -> tuple[int, int, list[str]]:
     problems += wrong[:SHOWN] + ([f"and {len(wrong) - SHOWN} more"] if len(wrong) > SHOWN else [])
     if not reaches or not checked:
         problems.append("it states nothing")
-    return len(checked), sum(".assertion." in name for name, _, _ in checked), problems
+    return len(checked), problems
 
 
 def prove(proof: Proof, run: Run) -> Outcome:
     """Run it."""
     command = command_of(proof, run)
 
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        resource.setrlimit(resource.RLIMIT_CPU, (ceil(run.limit), ceil(run.limit)))
-
     with tempfile.TemporaryFile("w+") as output:
-        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, preexec_fn=limit)
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
+        resource.prlimit(process.pid, resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.prlimit(process.pid, resource.RLIMIT_CPU, (ceil(run.limit), ceil(run.limit)))
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
-        properties, asserted, problems = judge(output.read())
+        properties, problems = judge(output.read())
     seconds = usage.ru_utime + usage.ru_stime
     if process.returncode < 0:
-        properties, asserted, problems = 0, 0, [f"not decided in {run.limit:g} s of processor time"]
+        properties, problems = 0, [f"not decided in {run.limit:g} s of processor time"]
     if problems:
         problems.append("see for yourself: " + shlex.join(os.path.relpath(w, ROOT) if w.startswith("/") else w for w in command) + " --trace")
-    return Outcome(proof, run, seconds, properties, asserted, tuple(problems))
+    return Outcome(proof, run, seconds, properties, tuple(problems))
 
 
 def report(outcome: Outcome) -> None:
@@ -299,20 +298,21 @@ def report(outcome: Outcome) -> None:
         print(f"      {problem}", flush=True)
 
 
-def write_results(gate: str, proven: int, outcomes: Sequence[Outcome]) -> None:
-    """build/results/GATE.json."""
-    sources = sorted({o.proof.source for o in outcomes})
-    promises = [{
-        "promise": "No undefined behaviour, no overrun of an array and no endless loop in any public function, for all inputs its header allows, at the stated sizes",
-        "result": f"{proven} of {len(public_functions())} public functions, {len(outcomes)} runs of {len({o.proof for o in outcomes})} proofs in {len(sources)} files, "
-        f"{sum(o.properties for o in outcomes)} properties proven",
-    }]  # fmt: skip
+def say(gate: str, proven: int, outcomes: Sequence[Outcome]) -> None:
+    """What the gate promises: the first sentence of each proof, and what was proven of it."""
+    said = [
+        (
+            "No undefined behaviour, no overrun of an array and no endless loop in any public function, for all inputs its header allows, at the sizes below",
+            f"{proven} of {len(public_functions())} public functions, {len(outcomes)} runs of {len({o.proof for o in outcomes})} proofs, "
+            f"{sum(o.properties for o in outcomes)} properties proven",
+        )
+    ]
     for proof in dict.fromkeys(o.proof for o in outcomes):
         own = [o for o in outcomes if o.proof is proof]
+        sentence = re.split(r"(?<!\.)\.(?= [A-Z]|$)", proof.says)[0]
         sizes = "; ".join(" ".join((o.run.real, *o.run.defines)) for o in own)
-        promises.append({"promise": proof.says, "result": f"{proof.name} ({proof.source.name}): {sum(o.properties for o in own)} properties; {sizes}"})
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{gate}.json").write_text(json.dumps({"gate": gate, "command": f"make {gate}", "promises": promises}, indent=2, ensure_ascii=False) + "\n")
+        said.append((sentence, f"{proof.name}, {sum(o.properties for o in own)} properties: {sizes}"))
+    write(gate, said)
 
 
 def prepare() -> int:
@@ -345,16 +345,17 @@ def main() -> int:
         chosen.sort(key=lambda pair: -pair[1].limit)
         with ThreadPoolExecutor(options.jobs) as pool:
             outcomes = []
-            for future in [pool.submit(prove, p, r) for p, r in chosen]:
+            for future in as_completed(pool.submit(prove, p, r) for p, r in chosen):
                 outcomes.append(future.result())
                 report(outcomes[-1])
     except (ProofError, InstrumentError) as error:
         print(f"proofs: {error}", file=sys.stderr)
         return 2
     failed = [o for o in outcomes if o.problems]
-    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} proven, {sum(o.properties for o in outcomes)} properties, {sum(o.seconds for o in outcomes):.0f} s of processor time; {subscripts} subscripts instrumented")
+    sums = f"{sum(o.properties for o in outcomes)} properties, {sum(o.seconds for o in outcomes):.0f} s of processor time"
+    print(f"{len(outcomes) - len(failed)} of {len(outcomes)} proven, {sums}; {subscripts} subscripts instrumented")
     if not options.names and not failed:
-        write_results("proofs-deep" if options.deep else "proofs", proven, sorted(outcomes, key=lambda o: every.index(o.proof)))
+        say("proofs-deep" if options.deep else "proofs", proven, sorted(outcomes, key=lambda o: (every.index(o.proof), o.proof.runs.index(o.run))))
     return 1 if failed else 0
 
 

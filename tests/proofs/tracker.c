@@ -12,7 +12,7 @@
  *  @proves hg_tracker_start hg_tracker_receive hg_tracker_expect hg_tracker_overdue hg_tracker_outage hg_tracker_health hg_tracker_step hg_tracker_report hg_tracker_estimate
  *  @proves hg_tracker_digest hg_fusion_sender_start hg_fusion_sender_step
  *  @without conversion unsigned-overflow: sample indices, stamps and the digest are meant to wrap, bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=60 FRAMES=1U */
+ *  @run check real=f32 unwind=65 limit=60 FRAMES=1U ANY_NUMBERS */
 void proof_tracker_receive(void)
 {
     static hg_fusion5_tracker storage;

@@ -72,7 +72,7 @@ void proof_trigger_step(void)
     }
 }
 
-/** The threshold that sender and receiver compute is 0 for what was sent as invalid, else sigma + floor(delta |sent - zero| / 65536), saturated: never negative, and no
+/** The threshold that sender and receiver compute is 0 for what was sent as invalid, else sigma and the share delta / 65536 of the distance from zero, rounded down and saturated: never negative, and no
  *  larger for a smaller distance.
  *  Any tables of WIDTH channels and LEVELS levels at most, any code.
  *  @proves hg_trigger_threshold
