@@ -17,9 +17,9 @@ typedef struct {
 } parts;
 
 /** A node takes any frames whatever: no undefined behaviour, a status of the closed list, its open sample never goes back, and at most 8 steps become due; whatever the application's
- *  clock says in between. Steps give a verdict of a plant that there is, and reports frames of the model that their reader understands.
+ *  clock says in between.
  *  The platoon's tables; FRAMES frames of any identifier, kind, length and bytes after a start, overdue, expect and outage among them.
- *  @proves hg_node_start hg_node_receive hg_node_expect hg_node_overdue hg_node_outage hg_node_step hg_node_report hg_node_health hg_verdict_read
+ *  @proves hg_node_start hg_node_receive hg_node_expect hg_node_overdue hg_node_outage hg_node_health
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes and checksums are cut on purpose
  *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 FRAMES=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=65 limit=7200 hg_detector_start.0:153 hg_ring_reset.0:109 FRAMES=3U */
@@ -61,18 +61,46 @@ void proof_node_receive(void)
             reach("a closing frame");
         }
     }
+    prove(hg_node_health(&self, 0U) == &link[0].health, "the group's");
+    reach("end");
+}
+
+/** A step that is due gives a verdict of a plant that there is, one that is not due nothing; what is reported are frames of the model that their reader understands, as they were.
+ *  The platoon's tables; a start anywhere, two samples whose closing frames did not come, any earlier report.
+ *  @proves hg_node_step hg_node_report hg_node_overdue
+ *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes and checksums are cut on purpose
+ *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 ANY_NUMBERS */
+void proof_node_step(void)
+{
+    parts p;
+    hg_link link[GROUPS];
+    int32_t closing[3];
+    int32_t code[12];
+    hg_real real[152];
+    const hg_node_memory memory = {.detector = {.hold = p.hold, .residual = p.residual, .hull = p.hull, .alarm = p.alarm, .code = code, .codes = 12U, .real = real, .reals = 152U},
+                                   .link = link, .closing = closing};
+    hg_node self;
+    prove(hg_node_start(&self, &hg_platoon_config, &memory, HG_START_MOVING) == HG_OK, "it starts");
+    self.k = any_u32();
+    self.silence = any_u16();
+    self.reported = any_bool();
+    assume(self.silence < hg_platoon_config.heartbeat);
     hg_verdict verdict;
     hg_can_frame out[2];
     hg_verdict read;
     bool reply;
-    if (hg_node_step(&self, &verdict) == HG_OK) {
+    prove(hg_node_step(&self, &verdict) == HG_E_EMPTY, "nothing is due");
+    for (uint8_t i = 0U; i < 2U; i++) {
+        hg_node_overdue(&self);
+        const uint32_t k = self.k;
+        prove((hg_node_step(&self, &verdict) == HG_OK) && (verdict.k == k), "a step");
         prove(verdict.plant <= HG_PLANT_CONFIRMED, "a state that there is");
-        prove(hg_node_report(&self, &verdict, any_bool(), out) <= 2U, "two frames at most");
+        const uint8_t frames = hg_node_report(&self, &verdict, true, out);
+        prove((frames >= 1U) && (frames <= 2U), "asked for a reply, one or two frames");
         prove(hg_verdict_read(hg_platoon_config.verdict, &out[0], &read, &reply) == HG_OK, "the reader understands it");
-        prove((read.plant == verdict.plant) && (read.candidates == verdict.candidates) && (read.bus == verdict.bus) && (read.refused == verdict.refused), "the same verdict");
-        reach("a step");
+        prove((read.plant == verdict.plant) && (read.bus == verdict.bus) && (read.refused == verdict.refused), "the same verdict");
     }
-    prove(hg_node_health(&self, 0U) == &link[0].health, "the group's");
+    reach("end");
 }
 
 /** Reports that are written are read as they were: every verdict that fits its frame, and any bytes are read without overrun; status frames hold what they were given, clipped.
