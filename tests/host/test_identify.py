@@ -121,8 +121,13 @@ def test_the_widest_triggers_that_show_a_fault_are_searched_for(monkeypatch: pyt
     assert fine is not None and 1.4 / 1.03 <= fine.scale <= 1.4
     few = tradeoff.chosen(curve, made.model, 0.4, None)
     assert few is not None and 1.5 <= few.scale <= 1.5 * 1.03
+    # Narrower than any width that a curve begins with, where the wish asks for it.
+    often = tradeoff.chosen(curve, made.model, 0.9, None)
+    assert often is not None and 1 / 9 <= often.scale <= 1.03**2 / 9
+    small = tradeoff.chosen(curve, made.model, None, ("f", 0.4))
+    assert small is not None and 0.1 / 1.03**2 <= small.scale <= 0.1
     assert tradeoff.chosen(curve, made.model, None, None) is None
-    for load, fault, word in ((0.1, None, "--bus-load 0.1"), (None, ("f", 0.4), "--smallest-fault f:0.4")):
+    for load, fault, word in ((0.1, None, "--bus-load 0.1"), (None, ("f", 0.3), "--smallest-fault f:0.3")):
         with pytest.raises(InputError, match=word):
             tradeoff.chosen(curve, made.model, load, fault)
     closed = replace(made.model, groups=tuple(g for g in made.model.groups if g.closing))

@@ -145,6 +145,8 @@ class Curve:
 
     def widest(self, good: Callable[[Point], bool]) -> Point | None:
         """The widest triggers with which `good` holds, which it does below some width; none where it never does."""
+        while not any(good(p) for p in self.points) and self._narrower():
+            pass
         fine = [p for p in self.points if good(p)]
         if not fine:
             return None
@@ -154,12 +156,21 @@ class Curve:
 
     def narrowest(self, good: Callable[[Point], bool]) -> Point | None:
         """The narrowest with which `good` holds, which it does above some width."""
+        while good(self.points[0]) and self._narrower():
+            pass
         fine = [p for p in self.points if good(p)]
         if not fine:
             return None
         best = fine[0]
         below = [p for p in self.points if p.scale < best.scale]
         return self._between(best, below[-1], good) if below else best
+
+    def _narrower(self) -> bool:
+        """A point below all others; none where a trigger could not see its signal's resolution any more."""
+        if self.points[0].scale <= self._least:
+            return False
+        self.at(max(self.points[0].scale / 4, self._least))
+        return True
 
     def _between(self, good_one: Point, other: Point, good: Callable[[Point], bool]) -> Point:
         for _ in range(STEPS):

@@ -150,9 +150,9 @@ class Rewriter:
             table.add(item)
 
     def _comment(self, item: Any, note: str, old: str = "") -> None:
-        """A remark behind a value, after what stood there; where the file's layout has no place for one there is none."""
+        """A remark behind a value, after what stood there, but for the word of `new` that it is to be checked; where the file's layout has no place for one there is none."""
         if isinstance(self._doc["signals"], AoT) and isinstance(item, Item):
-            before = (old or item.trivia.comment).removeprefix("#").strip()
+            before = (old or item.trivia.comment).removeprefix("#").partition("CHECK")[0].strip()
             item.comment(f"{before}; {note}" if before else note)
 
 

@@ -187,7 +187,7 @@ def _driven(plant: StateSpace, draft: Draft, discrete: bool) -> float:
     for _ in range(STEPS):
         reach, B = reach + np.abs(plant.C @ B), A @ B
     furthest = reach @ np.full(len(draft.inputs), min(half(s) for s in draft.inputs))
-    shares = [HALFWAY * half(s) / y for s, y in zip(draft.outputs, furthest, strict=True) if y > 0.0]
+    shares = [HALFWAY * half(s) / float(y) for s, y in zip(draft.outputs, furthest, strict=True) if y > 0.0]
     return min([HALFWAY, *shares])
 
 
