@@ -15,6 +15,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from certificates import Bank, Judged
 from dyadic import Exact, exact, joined, zeros
 from healthy import Healthy, within_slews
 from hullguard.core.library import library
@@ -216,6 +217,8 @@ class Run:
         self._residuals = [Residual(g, self.real, t.units, t.width, int(i)) for g, i in zip(t.generators, first, strict=False)]
         self._hulls = [Hull(self.made, g, self.start) if g.given is not None and g.zonotope is None else None for g in self.made.generators]
         self._first = [int(i) for i in first]
+        mismatched = bool(self.made.uncertain)  # of an uncertain plant radii without values count too
+        self._banks = [] if mismatched else [Bank(self.made, t, i) for i in range(len(t.banks))]
         self._truth: list[Exact] = []
         self._values: list[Exact] = []
         self._radii: list[Exact] = []
@@ -266,6 +269,24 @@ class Run:
             found, bound = residual.step(self._values[k])
             self._rounded(k, i, r, found, bound)
             self._threshold(k, i, J, abs(r[self._first[i] : self._first[i] + len(bound)] - found))
+
+        for i, bank in enumerate(self._banks):
+            place = self._native.tables.residuals - len(self._banks) + i
+            self._certified(f"sample {k}, bank {i + 1}", bank.judge(self._values, self._radii), r.fraction(place), J.fraction(place))
+
+    def _certified(self, what: str, certificates: list[Judged], r: Fraction, J: Fraction) -> None:
+        """What the library says of a bank is what one of its certificates is, and its threshold is no smaller than that one's least."""
+        if not certificates:
+            return
+        off = [abs(c.r.fraction(0) - r) + max(c.J.fraction(0) - J, J - c.J.fraction(0)) for c in certificates]
+        found = certificates[int(np.argmin([float(x) for x in off]))]
+        if abs(found.r.fraction(0) - r) > Fraction(found.rounding):
+            raise BrokenError(f"{what}: r = {float(r):.9g} is that of no certificate")
+        if found.J.fraction(0) > J:
+            raise BrokenError(f"{what}: J = {float(J):.9g} is less than the exact {float(found.J.fraction(0)):.9g}")
+        if float(J - found.J.fraction(0)) > found.above:
+            raise BrokenError(f"{what}: J = {float(J):.9g} is above the exact {float(found.J.fraction(0)):.9g} by more than {found.above:.3g}")
+        self.worst.low = min(self.worst.low, float(J / found.J.fraction(0)))
 
     def _held(self, k: int, links: Links) -> None:
         """|true - value| <= radius."""
