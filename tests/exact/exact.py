@@ -42,13 +42,17 @@ STARTS = {"rest": REST, "moving": MOVING}
 LOSS = 0.15
 UNCERTAIN = {"plant.drag_per_s": {"value": 1.0, "pm": 0.1}}
 PREDICTED = {"detector.prediction": True}
+ZONOTOPE = {"detector.threshold": "zonotope"}
 SILENT = {"groups.measurement.trigger.silence": 1}
 # How near to 1 the adversary must come, for each kind of judge; of a model that is not here NEAR_OTHER.
 NEAR = {
     "platoon": {"residuals": 0.97},
     "platoon-silent": {"residuals": 0.95},
     "platoon-uncertain": {"residuals": 0.95},
+    "platoon-predicted": {"residuals": 0.95},
+    "platoon-zonotope": {"residuals": 0.9},
     "platoon_bank": {"residuals": 0.95, "banks": 0.95},
+    "platoon_bank-together": {"residuals": 0.8, "banks": 0.9},
     "openacc": {"residuals": 0.98},
     "suspension": {"residuals": 0.93, "estimates": 0.99},
     "suspension_published": {"residuals": 0.5, "estimates": 0.9},
@@ -187,6 +191,8 @@ VARIANTS = (
     Subject("platoon-silent", "platoon", tuple(SILENT.items())),
     Subject("platoon-uncertain", "platoon", tuple(UNCERTAIN.items())),
     Subject("platoon-predicted", "platoon", tuple(PREDICTED.items())),
+    Subject("platoon-zonotope", "platoon", tuple(ZONOTOPE.items())),
+    Subject("platoon_bank-together", "platoon_bank", tuple((UNCERTAIN | PREDICTED | ZONOTOPE).items())),
 )
 
 
@@ -200,7 +206,7 @@ def jobs(deep: bool, only: list[str]) -> list[Job]:
         uio, uncertain = bool(d.uios), bool(d.model.plant.dA.any() or d.model.plant.dB.any())
         fewer = 1 if subject.random or d.model.plant.n > 6 else 2
         losses = (0.0, LOSS)
-        if not uio and not uncertain:
+        if not uio:
             reals = [r for r in REALS if r != "q31" or d.tables.fixed is not None]
             made += [Job("oracle", subject, real, start, loss, 40, fewer * more) for real in reals for start in STARTS for loss in losses]
         samples = 25 if d.model.plant.n > 6 else 45
@@ -228,7 +234,8 @@ def table(done: list[Done]) -> list[str]:
             w = worst[0]
             for other in worst[1:]:
                 w = w.join(other)
-            lines.append(f"{name:<30} {w.hold:>20.4f} {w.rounding:>15.3f} {w.slack:>20.3f} {w.low:>11.8f}")
+            hulls = f"{w.slack:>20.3f} {w.low:>11.8f}" if w.low < float("inf") else f"{'no hull':>20}"
+            lines.append(f"{name:<30} {w.hold:>20.4f} {w.rounding:>15.3f} {hulls}")
     lines += ["", f"{'model, largest |r|/J reached':<30} {'residuals':>10} {'banks':>10} {'estimates':>10} {'runs':>7} {'alarms':>7}   with losses: {'runs':>6} confirmed"]
     for name in names:
         own = [d for d in done if d.found is not None and d.job.subject.name == name]

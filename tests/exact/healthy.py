@@ -41,6 +41,7 @@ class Healthy:
     made: Design
     rng: np.random.Generator
     state: Exact = field(init=False)
+    mismatch: Exact = field(init=False)  # of the last step: what a plant inside the intervals has done beyond the middle
 
     def __post_init__(self) -> None:
         plant = self.made.model.plant
@@ -86,7 +87,9 @@ class Healthy:
         model, m = self.made.model, self._m
         u, d = self._inputs(), exact(self._signs(m.Ed.whole.shape[1]))
         y = m.C @ self.state + m.D @ u + m.Fd @ d
-        self.state = m.A @ self.state + m.B @ u + m.Ed @ d
+        p = model.plant
+        self.mismatch = exact(p.dA * self._signs(p.dA.size).reshape(p.dA.shape)) @ self.state + exact(p.dB * self._signs(p.dB.size).reshape(p.dB.shape)) @ u
+        self.state = m.A @ self.state + m.B @ u + m.Ed @ d + self.mismatch
         places = max(y.places, u.places)
         reading = np.zeros(len(model.signals), dtype=object)
         reading[model.outputs] = (y.whole * (1 << (places - y.places)))[: len(model.outputs)]

@@ -1,6 +1,7 @@
 """The library against exact rational numbers: every value and radius, every residual, every threshold of a run, as they lie in its memory.
 
-    |true - value| <= radius              of every signal of a group whose losses are known, also of the samples before that a gap has rewritten
+    |true - value| <= radius              of every signal of a group whose losses are known, also of the samples before that a gap has rewritten; and of
+                                          what an uncertain plant does beyond its middle
     |r_exact - r| <= rounding of r        r_exact from the tables and the values that the library has, in rational numbers
     J >= J_exact + |r_exact - r|          the hull of these tables over the radii that the library has: disturbances and initial states as they are,
                                           the plant as it is; no tail. And J no more above it than the design says it may be.
@@ -40,7 +41,7 @@ class Worst:
 
     hold: float = 0.0  # |true - value| / radius
     rounding: float = 0.0  # |r_exact - r| / bound
-    low: float = 1e9  # J / J_exact, at least 1
+    low: float = float("inf")  # J / J_exact, at least 1
     slack: float = 0.0  # (J - J_exact) / what it may be
     samples: int = 0
 
@@ -220,6 +221,7 @@ class Run:
         mismatched = bool(self.made.uncertain)  # of an uncertain plant radii without values count too
         self._banks = [] if mismatched else [Bank(self.made, t, i) for i in range(len(t.banks))]
         self._truth: list[Exact] = []
+        self._mismatch: list[Exact] = []
         self._values: list[Exact] = []
         self._radii: list[Exact] = []
         half = np.array([s.half for g in tables.groups for s in g.signals])  # of inputs that are applied as sent: rounding alone
@@ -236,6 +238,7 @@ class Run:
         closing = self.made.tables.closing
         for k in range(count):
             self._truth.append(plant.step())
+            self._mismatch.append(plant.mismatch)
             if not within_slews(self.made, self._truth[-12:]):
                 raise BrokenError("the plant of this check moves faster than the model says: the check is wrong")
             reading, shows = self._truth[-1].floats().tolist(), False
@@ -299,6 +302,13 @@ class Run:
             if not any(links.unknown):
                 for n in range(len(p.output)):
                     self._within(f"sample {k}, prediction of signal {p.first + n}", self._truth[k], p.first + n, self._twin(p, n), k)
+
+        first = self.made.tables.width - len(self.made.uncertain)
+        for n, state in enumerate(self.made.uncertain if not any(links.unknown) else ()):
+            moved, radius = abs(self._mismatch[k]).fraction(state), self._radii[k].fraction(first + n)
+            if moved > radius:
+                raise BrokenError(f"sample {k}, state {state}: what an uncertain plant does, {float(moved):.9g}, is more than the radius {float(radius):.9g}")
+            self.worst.hold = max(self.worst.hold, float(moved / radius))
 
     def _twin(self, p: Any, n: int) -> int:
         before = self.made.tables.predictors[: self.made.tables.predictors.index(p)]

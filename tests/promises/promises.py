@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "tests" / "PROMISES.md"
 HEAD = """# What is promised, and the command that checks it
 
-Made by `make promises` from what every gate wrote when it last passed; `make check` fails where this page and the gates disagree. What the gates would miss if they
+Made by `make promises` from what every gate wrote when it last passed; `make check` fails where the gates promise something else than this page says. Results
+are those of one run: tools count differently, and most numbers grow with the code, so they are not compared. What the gates would miss if they
 were blind is shown by `make seeded`: realistic faults, each of which turns its gate red.
 """
 

@@ -1,4 +1,4 @@
-"""seeded.py [--all] [--gate GATE ..] [--gates GATE ..]: proof that the gates can fail. Realistic faults are put into a copy of
+"""seeded.py [--all] [--gate GATE .. [--fault NAME]] [--gates GATE ..]: proof that the gates can fail. Realistic faults are put into a copy of
 the tree, one at a time, and each must turn its gate red.
 
 tests/seeded/GATE.toml holds [[fault]] tables: name; file, old, new (the text `old`, there exactly once, becomes `new`); why; gate, the command as a list of words, run in the
@@ -184,6 +184,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="realistic faults, each of which must turn its gate red")
     parser.add_argument("--all", action="store_true", help="every fault, and each command without it first")
     parser.add_argument("--gate", nargs="+", default=[], help="faults of these gates alone, all of them")
+    parser.add_argument("--fault", default="", help="only those with this in their name")
     parser.add_argument("--gates", nargs="+", default=[], help="gates that must have a fault")
     parser.add_argument("--jobs", type=int, default=min(4, len(os.sched_getaffinity(0))))
     asked = parser.parse_args()
@@ -193,7 +194,7 @@ def main() -> int:
     if wrong:
         print("\n".join(f"seeded: {line}" for line in wrong), file=sys.stderr)
         return 1
-    chosen = [fault for fault in faults if fault.of in asked.gate] if asked.gate else faults if asked.all else drawn(faults)
+    chosen = [fault for fault in faults if fault.of in asked.gate and asked.fault in fault.name] if asked.gate else faults if asked.all else drawn(faults)
     print(f"seeded: {len(chosen)} of {len(faults)} faults, HULLGUARD_SEED={SEED}", flush=True)
     missed = sum(bool(text) for text in judged(chosen, asked.all, asked.jobs))
     gates = len({fault.of for fault in chosen})
