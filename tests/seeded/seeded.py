@@ -1,9 +1,10 @@
 """seeded.py [--all] [--gate GATE .. [--fault NAME]] [--gates GATE ..]: proof that the gates can fail. Realistic faults are put into a copy of
 the tree, one at a time, and each must turn its gate red.
 
-tests/seeded/GATE.toml holds [[fault]] tables: name; file, old, new (the text `old`, there exactly once, becomes `new`); why; gate, the command as a list of words, run in the
-copy; expect, a text that must stand in its output, so that it fails for the right reason. Without --all a draw (HULLGUARD_SEED) takes one fault of each gate. A gate of
---gates without a fault is an error. With --all each command must also pass in the copy as it is.
+tests/seeded/GATE.toml holds [[fault]] tables: name; file, old, new (the text `old`, there exactly once, becomes `new`); why; gate, the command as a list of
+words, run in the copy; expect, a text that must stand in its output, so that it fails for the right reason. Without --all a draw (HULLGUARD_SEED) takes one
+fault of each gate; with it all are taken, and each command must also pass in the copy as it is. A gate of --gates without a fault is an error, and so is a file of
+no gate; NAME-quick and NAME-short may have their faults in NAME.toml.
 
 The copies stand in build/seeded, one a process. They begin as the tree and its build directory are and are brought back to that after every fault, with the times of all
 files, so that make builds only what the fault touches.
@@ -152,6 +153,11 @@ class Copy:
         return "" if fault.expect in said else f"fails for another reason; it does not say: {fault.expect}\n{said[-2000:]}"
 
 
+def stem(gate: str) -> str:
+    """Of the short form of a gate, the gate: their faults are the same."""
+    return gate.removesuffix("-quick").removesuffix("-short")
+
+
 def drawn(faults: list[Fault]) -> list[Fault]:
     """One fault of each gate."""
     draw = random.Random(SEED)
@@ -190,7 +196,10 @@ def main() -> int:
     asked = parser.parse_args()
     faults = read(ROOT / "tests" / "seeded")
     wrong = [f"{fault.of}: {fault.name}: {text}" for fault in faults if (text := fault.check())]
-    wrong += [f"{gate}: no fault is known that turns it red: tests/seeded/{gate}.toml" for gate in asked.gates if gate not in {fault.of for fault in faults}]
+    named = {fault.of for fault in faults}
+    wrong += [f"{gate}: no fault is known that turns it red: tests/seeded/{gate}.toml" for gate in asked.gates if not {gate, stem(gate)} & named]
+    known = {name for gate in asked.gates for name in (gate, stem(gate))}
+    wrong += [f"tests/seeded/{name}.toml: there is no such gate" for name in sorted(named - known) if asked.gates]
     if wrong:
         print("\n".join(f"seeded: {line}" for line in wrong), file=sys.stderr)
         return 1
