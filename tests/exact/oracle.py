@@ -2,7 +2,8 @@
 
     |true - value| <= radius              of every signal of a group whose losses are known, also of the samples before that a gap has rewritten; and of
                                           what an uncertain plant does beyond its middle
-    |r_exact - r| <= rounding of r        r_exact from the tables and the values that the library has, in rational numbers
+    |r_exact - r| <= rounding of r        r_exact from the tables and the values that the library has, in rational numbers; and in fixed point, where half a
+                                          step each is all there is, the design's share of the threshold is no less than what all of them can add up to
     J >= J_exact + |r_exact - r|          the hull of these tables over the radii that the library has: disturbances and initial states as they are,
                                           the plant as it is; no tail. And J no more above it than the design says it may be.
 
@@ -119,6 +120,14 @@ class Residual:
         bound = off * 2.0 ** np.array(self._out)
         return joined([r[i : i + 1].scaled(unit) for i, unit in enumerate(self._out)]), bound
 
+    def fixed(self, decay: Array) -> Array:
+        """What fixed point may lose at most, of r and of J: half a step at each sum, and in a tail at a product and a sum each sample."""
+        F, G = self.F.floats(), self.G.floats()
+        lost, power = np.full(len(self._out), 0.5), F
+        while np.abs(power).max() > 1e-12:
+            lost, power = lost + 0.5 * np.abs(power).sum(1), power @ G
+        return np.asarray((lost + 0.5 + 1.0 / (1.0 - decay)) * 2.0 ** (np.array(self._out) - 31))
+
 
 class Hull:
     """The threshold of one generator in rational numbers, from the radii that the library has."""
@@ -220,6 +229,8 @@ class Run:
         self._first = [int(i) for i in first]
         mismatched = bool(self.made.uncertain)  # of an uncertain plant radii without values count too
         self._banks = [] if mismatched else [Bank(self.made, t, i) for i in range(len(t.banks))]
+        if self.real == "q31":
+            self._stated()
         self._truth: list[Exact] = []
         self._mismatch: list[Exact] = []
         self._values: list[Exact] = []
@@ -227,6 +238,16 @@ class Run:
         half = np.array([s.half for g in tables.groups for s in g.signals])  # of inputs that are applied as sent: rounding alone
         self._usual = np.array(self.made.usual)
         self._usual[: len(half)] = np.maximum(self._usual[: len(half)], half)
+
+    def _stated(self) -> None:
+        """What the design says that rounding is of a threshold is no less than what it can be."""
+        for i, residual in enumerate(self._residuals):
+            g = self.made.generators[i]
+            if g.zonotope is None:
+                stated = np.array(self.made.fixed_rounding[self._first[i] : self._first[i] + len(g.tables.decay)])
+                lost = residual.fixed(g.tables.decay)
+                if np.any(lost > stated * (1 + 1e-9)):
+                    raise BrokenError(f"generator {i + 1}: rounding in fixed point is said to be {stated}, it can be {lost}")
 
     def samples(self, count: int) -> Worst:
         """So many; the first promise that does not hold ends it."""
