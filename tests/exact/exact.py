@@ -203,7 +203,7 @@ def jobs(deep: bool, only: list[str]) -> list[Job]:
     randoms = [Subject(f"random {i}", random=i) for i in range(1, 41 if deep else 5)]
     for subject in [s for s in (*shipped(), *VARIANTS, *randoms) if not only or s.name in only]:
         d = subject.design()
-        uio, uncertain = bool(d.uios), bool(d.model.plant.dA.any() or d.model.plant.dB.any())
+        uio = bool(d.uios)
         fewer = 1 if subject.random or d.model.plant.n > 6 else 2
         losses = (0.0, LOSS)
         if not uio:
