@@ -1,7 +1,7 @@
 # Documentation: the API reference from the headers, the pages as HTML, and every picture and measured number from the commands beside them.
 
 .PHONY: docs figures figures-check
-docs: lib ## build/docs/: the headers as a manual, and all pages, as HTML; fails where something is not explained or a link leads nowhere
+docs: ## build/docs/: the headers as a manual, and all pages, as HTML; fails where something is not explained or a link leads nowhere
 	@$(PY) tests/docs/manual.py $(BUILD)/docs
 
 figures: lib ## make every picture and every measured table of the documentation again, from commands
@@ -9,5 +9,4 @@ figures: lib ## make every picture and every measured table of the documentation
 
 figures-check: lib
 	@$(PY) tests/docs/figures.py --check
-	@echo "  ok  pictures and tables of the documentation are those of their commands"
-CHECK_PARTS += figures-check
+CHECK_PARTS += docs figures-check
