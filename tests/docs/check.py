@@ -7,15 +7,18 @@ from collections.abc import Iterator, Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 
+import tree_sitter_c
 from headers import ROOT, Header, Item, Member, groups
+from tree_sitter import Language, Node, Parser
 
+SOURCES = ROOT / "firmware" / "src"
 EXPLAINED = ("struct", "enum", "function", "macro", "type")
 RETVAL = re.compile(r"@retval (\w+)")
 
 
 def complaints(headers: Sequence[Header], site: Path) -> list[str]:
     """A line each."""
-    return [*unexplained(headers), *unknown_statuses(headers), *broken_links(site)]
+    return [*unexplained(headers), *unknown_statuses(headers), *unannounced(headers, sorted(SOURCES.glob("*.c"))), *broken_links(site)]
 
 
 def facts(headers: Sequence[Header], site: Path) -> list[dict[str, str]]:
@@ -26,14 +29,17 @@ def facts(headers: Sequence[Header], site: Path) -> list[dict[str, str]]:
     links = sum(len(_Page(p).links) for p in site.rglob("*.html"))
     return [
         {
-            "promise": "Every public function, type, macro, field and enum member of the library and of hal/ has words that say what it is.",
+            "promise": "Every public function, type, macro, field and enum member of the library and of hal/ has words that say what it is, or a type of the library that does.",
             "result": f"{len(headers)} headers: {count['function']} functions, {count['struct']} structs, {count['enum']} enums, {members} members, {count['macro']} macros",
         },
         {
-            "promise": "Every status that a function names is one of the closed list, and every function that returns a status names those it returns.",
+            "promise": "Every status that a header names is one of the closed list; every function that returns a status names those it can return, and its code names no other.",
             "result": f"{sum(len(RETVAL.findall(i.text)) for i in every)} statuses of {sum(i.result == 'hg_status' for i in every)} functions",
         },
-        {"promise": "Every relative link and anchor of the markdown pages and of the generated ones leads somewhere.", "result": f"{links} links in {len(list(site.rglob('*.html')))} pages"},
+        {
+            "promise": "Every relative link and anchor of the markdown pages and of the generated ones leads somewhere.",
+            "result": f"{links} links in {len(list(site.rglob('*.html')))} pages",
+        },
     ]
 
 
@@ -41,7 +47,7 @@ def facts(headers: Sequence[Header], site: Path) -> list[dict[str, str]]:
 
 
 def unexplained(headers: Sequence[Header]) -> list[str]:
-    """Declarations without a word. What has several variants may be explained at one of them, a struct by its fields, and a field by its type, where that is a struct or an enum of the library."""
+    """Declarations without a word. One of several variants may speak for all, the fields for a struct, and a struct or enum of the library for a field of that type."""
     types = {i.name for h in headers for i in h.items if i.kind in ("struct", "enum")}
     wrong = []
     for h in headers:
@@ -74,6 +80,41 @@ def unknown_statuses(headers: Sequence[Header]) -> list[str]:
             if item.result == "hg_status" and not named:
                 wrong.append(f"{place}: {item.name} returns a status and names none (@retval)")
     return wrong
+
+
+def unannounced(headers: Sequence[Header], sources: Sequence[Path]) -> list[str]:
+    """Statuses that a function's own code answers and its header does not name. What it hands on from a call it makes is not looked at."""
+    named = {i.name: set(RETVAL.findall(i.text)) for h in headers for i in h.items if i.kind == "function" and i.result == "hg_status"}
+    wrong = []
+    for path in sources:
+        for node in Parser(Language(tree_sitter_c.language())).parse(path.read_bytes()).root_node.children:
+            body = node.child_by_field_name("body")
+            if node.type == "function_definition" and body and (name := _name(node)) in named:
+                wrong += [f"{path.name}:{node.start_point.row + 1}: {name} answers {status}, which its header does not name" for status in sorted(_answers(body) - named[name])]
+    return wrong
+
+
+def _name(node: Node) -> str:
+    """Of the function that is defined here."""
+    while inner := node.child_by_field_name("declarator"):
+        node = inner
+    return (node.text or b"").decode()
+
+
+def _answers(node: Node) -> set[str]:
+    """Statuses that stand in a body, but for those that something is compared with."""
+    if node.type == "identifier":
+        text = (node.text or b"").decode()
+        return {text} if re.fullmatch(r"HG_(OK|E_\w+)", text) and not _compared(node) else set()
+    return {status for child in node.children for status in _answers(child)}
+
+
+def _compared(node: Node) -> bool:
+    around = node.parent
+    while around and around.type == "parenthesized_expression":
+        around = around.parent
+    sign = around.child_by_field_name("operator") if around and around.type == "binary_expression" else None
+    return bool(sign and sign.text in (b"==", b"!=")) or bool(around and around.type == "case_statement" and around.child_by_field_name("value") == node)
 
 
 # ---- links ----

@@ -1,7 +1,8 @@
 """`make figures`: every picture and every measured table of the documentation, from the commands that stand beside them.
 
 Pictures go to host_tools/pictures/. A table stands in a page between `<!-- measured: NAME -->` and `<!-- end -->`: the command first, then what it said. From the same sources and
-packages the bytes are the same; `--check` makes all of it in build/ and fails where a picture or a table in the tree is another."""
+packages the bytes are the same; `--check` makes all of it in build/ and fails where a picture or a table in the tree is another.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +48,7 @@ MEASURED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTAL
 
 @cache
 def said(command: str) -> str:
-    """stdout of `hullguard COMMAND`, run in build/figures/."""
+    """Standard output of `hullguard COMMAND`, run in build/figures/."""
     WORK.mkdir(parents=True, exist_ok=True)
     out = io.StringIO()
     with contextlib.chdir(WORK), contextlib.redirect_stdout(out):
@@ -76,6 +77,11 @@ def outcome(case: dict[str, Any]) -> list[str]:
     return [f"{100 * case['measurement_share']:.1f} %", f"{case['detected_runs']} of {case['runs']}", delay, str(case["false_alarm_runs"])]
 
 
+FRAMES = ("frames", "frames, % of periodic", GREEN)  # column, label, colour
+SMALLEST = ("smallest fault", "smallest fault, m/s²", BLUE)
+EVERY = ("found in every run from", "found in every run from, m/s²", BLUE)
+DELAY, DELAY_OF_1 = (("mean delay" + of, "delay of a fault of 1, samples", RED) for of in ("", " of 1"))
+COST = ("multiplications a sample", "multiplications a sample", GREEN)
 OUTCOME = ["frames", "found", "mean delay", "false alarms"]
 
 
@@ -117,9 +123,13 @@ def varied(key: str, values: Sequence[str], title: str, extra: str = "") -> Tabl
     return Table((command, f"design platoon --set {key}=..{extra}"), (title, "smallest fault", *OUTCOME), tuple(rows))
 
 
+def _code(options: str) -> str:
+    return f"`{options}`" if options else ""
+
+
 def chosen(ways: dict[str, str], title: str) -> Table:
     """A campaign for each of several sets of options."""
-    rows = [(name, smallest(re.sub(r"--(real|plants) \w+", "", options)), *outcome(cases(f"campaign {REST_RUNS} {options}")[0]), f"`{options}`" if options else "") for name, options in ways.items()]
+    rows = [(name, smallest(re.sub(r"--(real|plants) \w+", "", options)), *outcome(cases(f"campaign {REST_RUNS} {options}")[0]), _code(options)) for name, options in ways.items()]
     return Table((f"campaign {REST_RUNS} OPTIONS",), (title, "smallest fault", *OUTCOME, "options"), tuple(rows))
 
 
@@ -212,7 +222,9 @@ def beyond() -> Table:
     for size in ("0.02", "0.05", "0.1", "0.2", "0.5"):
         case = cases(f"campaign platoon --scenario rest --runs 100 --seed 12 --fault gap12_m:noise:{size}@100")[0]
         rows.append((size, f"{float(size) / 0.01 + 1.0:g}", f"{case['detected_runs']} of {case['runs']}"))
-    return Table(("campaign platoon --scenario rest --runs 100 --seed 12 --fault gap12_m:noise:..@100",), ("noise added to gap12_m, m", "times the bound", "runs with an alarm"), tuple(rows))
+    return Table(
+        ("campaign platoon --scenario rest --runs 100 --seed 12 --fault gap12_m:noise:..@100",), ("noise added to gap12_m, m", "times the bound", "runs with an alarm"), tuple(rows)
+    )
 
 
 def losses() -> Table:
@@ -224,7 +236,10 @@ def losses() -> Table:
 
 def identified() -> Words:
     """Bounds from a recording, here of the emulated plant, whose own bounds are known: 0.01 each."""
-    commands = ("run platoon --bus inprocess --scenario manoeuvres --no-fault --samples 1000 --seed 3 --out drive", "identify platoon --csv drive/signals.csv --bus-load 0.4 --force --out identified")
+    commands = (
+        "run platoon --bus inprocess --scenario manoeuvres --no-fault --samples 1000 --seed 3 --out drive",
+        "identify platoon --csv drive/signals.csv --bus-load 0.4 --force --out identified",
+    )
     said(f"{commands[0]} -q")
     return Words(commands, tuple(line for line in said(commands[1]).splitlines() if not line.startswith("model: ")))
 
@@ -244,13 +259,12 @@ def started() -> Table:
     rows = []
     for name, options in (("0.5 m/s, 1 m: the plant's", ""), ("0.01 m/s, 0.01 m", " --set plant.initial_range={speed=0.01,gap=0.01}")):
         verdicts = json.loads(said(f"detect platoon --rest --log moved/run.log --json -q{options}"))["verdicts"]
-        rows.append((name, ", ".join(f"{v['plant']} from sample {v['k']}" for v in verdicts), f"`{options.strip()}`" if options else ""))
+        rows.append((name, ", ".join(f"{v['plant']} from sample {v['k']}" for v in verdicts), _code(options.strip())))
     return Table((run, "detect platoon --rest --log moved/run.log OPTIONS"), ("initial_range of the detector", "verdicts", "options"), tuple(rows))
 
 
-TABLES: dict[str, Callable[[], Table | Words]] = {
-    f.__name__: cache(f) for f in (identified, trigger, kinds, interval, state, noise, plants, order, threshold, banks, beyond, attacked, started, losses)
-}  # fmt: skip
+MADE: tuple[Callable[[], Table | Words], ...] = (identified, trigger, kinds, interval, state, noise, plants, order, threshold, banks, beyond, attacked, started, losses)
+TABLES = {f.__name__: cache(f) for f in MADE}
 
 
 # ---- pictures ----
@@ -315,9 +329,9 @@ def monitor(path: Path) -> None:
 PICTURE: dict[str, Callable[[Path], None]] = {
     "platoon.png": platoon,
     "monitor.svg": monitor,
-    "trigger.svg": curves("trigger", "sigma, m and m/s", "sigma", (("frames", "frames, % of periodic", GREEN), ("found in every run from", "found in every run from, m/s²", BLUE), ("mean delay of 1", "delay of a fault of 1, samples", RED))),
-    "order.svg": curves("order", "order of the observer", "order", (("smallest fault", "smallest fault, m/s²", BLUE), ("mean delay", "delay of a fault of 1, samples", RED), ("multiplications a sample", "multiplications a sample", GREEN))),
-    "bounds.svg": curves("state", "disturbance of each state", "disturbance of each state", (("smallest fault", "smallest fault, m/s²", BLUE), ("mean delay", "delay of a fault of 1, samples", RED))),
+    "trigger.svg": curves("trigger", "sigma, m and m/s", "sigma", (FRAMES, EVERY, DELAY_OF_1)),
+    "order.svg": curves("order", "order of the observer", "order", (SMALLEST, DELAY, COST)),
+    "bounds.svg": curves("state", "disturbance of each state", "disturbance of each state", (SMALLEST, DELAY)),
 }  # fmt: skip
 
 
@@ -362,7 +376,8 @@ def passed(results: Path) -> None:
     promise = "Every picture in host_tools/pictures and every measured table in host_tools/docs is, to the byte, what the commands beside it make."
     result = f"{len(PICTURE)} pictures, {len(TABLES)} tables"
     results.mkdir(parents=True, exist_ok=True)
-    (results / "figures-check.json").write_text(json.dumps({"gate": "figures-check", "command": "make figures-check", "promises": [{"promise": promise, "result": result}]}, indent=1) + "\n")
+    gate = {"gate": "figures-check", "command": "make figures-check", "promises": [{"promise": promise, "result": result}]}
+    (results / "figures-check.json").write_text(json.dumps(gate, indent=1) + "\n")
     print(f"  ok  {result} of the documentation are as they were")
 
 

@@ -1,7 +1,8 @@
 """Reads the public headers as what they are, a manual: every declaration with the comments that belong to it, in the order of the file.
 
 The headers keep the style of the code, not a tool's: a comment belongs to what it stands before, or to what it stands behind on its line. Declarations come from tree-sitter's
-grammar of C; conditions of the preprocessor are taken out before, so that every variant which a build can have is read, under its condition."""
+grammar of C; conditions of the preprocessor are taken out before, so that every variant which a build can have is read, under its condition.
+"""
 
 from __future__ import annotations
 
@@ -53,6 +54,7 @@ class Header:
 
     @property
     def name(self) -> str:
+        """Of the file."""
         return self.path.name
 
 
@@ -122,7 +124,9 @@ def parse(path: Path, text: str) -> Header:
 
 def _flat(lines: list[str]) -> tuple[list[str], list[str]]:
     """Lines with those of conditions blanked, and the condition of each line: "" where every build has it."""
-    flat, conditions, stack = [], [], [""]
+    flat: list[str] = []
+    conditions: list[str] = []
+    stack = [""]
     for line in lines:
         said = re.sub(r"/\*.*?\*/", "", line).strip()
         word, _, rest = said.partition(" ")
@@ -157,10 +161,6 @@ def _collect(reading: _Reading, node: Node) -> None:
                 reading.comments.append(_Comment(child.start_point.row, child.end_point.row, text))
         elif child.type != "compound_statement":
             _collect(reading, child)
-        if child.type == "preproc_def" and "/*" in reading.text(child):  # the grammar takes a comment for a part of the value
-            raw = re.search(r"/\*.*", reading.text(child), re.DOTALL)
-            assert raw
-            reading.comments.append(_Comment(child.start_point.row, child.start_point.row, _plain(raw.group(0).strip())))
 
 
 def _plain(raw: str) -> str:
@@ -212,7 +212,7 @@ def _note(comment: _Comment) -> Item | None:
 
 
 def _follows(reading: _Reading, row: int) -> bool:
-    """Is there nothing but conditions between this line and a declaration above?"""
+    """Whether nothing but conditions lies between this line and a declaration above."""
     above = row - 1
     while above > 0 and re.match(r"#(if|endif)", reading.raw[above]):
         above -= 1
@@ -261,7 +261,7 @@ def _declared(node: Node, reading: _Reading) -> str:
     """The name inside of a declarator: of a pointer, an array, a function pointer."""
     inner = node.child_by_field_name("declarator")
     if inner is None:
-        inner = next((c for c in node.children if c.type.endswith("declarator") or c.type in ("field_identifier", "type_identifier", "identifier")), None) if node.children else None
+        inner = next((c for c in node.children if c.type.endswith(("declarator", "identifier"))), None)
     return reading.text(node) if inner is None else _declared(inner, reading)
 
 

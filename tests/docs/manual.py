@@ -11,6 +11,7 @@ import sys
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from check import complaints, facts
@@ -77,7 +78,7 @@ def linked(site: Site, text: str, here: str) -> str:
 
 def _relative(to: str, here: str) -> str:
     path, mark, anchor = to.partition("#")
-    return (os.path.relpath(path, os.path.dirname(here) or ".") if path != here else "") + mark + anchor
+    return (os.path.relpath(path, Path(here).parent) if path != here else "") + mark + anchor
 
 
 def prose(site: Site, text: str, here: str) -> str:
@@ -164,7 +165,7 @@ def _contents(site: Site, h: Header, here: str) -> Iterator[str]:
 def _reading_order(site: Site, here: str) -> str:
     rows = []
     for h in site.headers:
-        if h.name != here.split("/")[-1].removesuffix(".html"):
+        if h.name != Path(here).stem:
             first = re.split(r"(?<=[.:])\s", " ".join(next(_blocks(h.purpose)).split()), maxsplit=1)[0].rstrip(":")
             rows.append(f'<tr><td><a href="{_relative(address(h.path), here)}">{h.name}</a></td><td>{linked(site, first, here)}</td></tr>')
     return f'<table class="order">{"".join(rows)}</table>'
@@ -183,7 +184,7 @@ def _item(site: Site, group: list[Item], here: str, marked: list[str]) -> str:
     code = "\n".join(i.code for i in group) if item.kind in ("macro", "type") else _signature(item) if item.kind == "function" else ""
     body = f"<pre class=code>{linked(site, code, here)}</pre>" if code else ""
     members = _members(site, item, here) if item.members else ""
-    return f'<section class=item>{marks}<h3>{", ".join(i.name for i in group)} {kind}{where}</h3>\n{body}{prose(site, item.text, here)}{members}</section>'
+    return f"<section class=item>{marks}<h3>{', '.join(i.name for i in group)} {kind}{where}</h3>\n{body}{prose(site, item.text, here)}{members}</section>"
 
 
 def _signature(item: Item) -> str:
@@ -220,7 +221,7 @@ def parsed(path: Path) -> list[Token]:
     """Tokens of a page, each heading with its anchor."""
     tokens = MarkdownIt("commonmark").enable("table").parse((ROOT / path).read_text())
     used: dict[str, int] = {}
-    for token, inline in zip(tokens, tokens[1:], strict=False):
+    for token, inline in pairwise(tokens):
         if token.type == "heading_open":
             title = "".join(c.content for c in inline.children or () if c.type in ("text", "code_inline"))
             token.attrSet("id", _slug(title, used))
@@ -274,7 +275,8 @@ def index_page(site: Site) -> str:
     """The way in."""
     title = {p: next((line.lstrip("# ") for line in (ROOT / p).read_text().split("\n") if line.startswith("# ")), p.stem) for p in site.pages}
     pages = "".join(f'<tr><td><a href="{address(p)}">{html.escape(title[p])}</a></td><td><code>{p}</code></td></tr>' for p in site.pages)
-    return shell(site, "Manual", f"<h1>hullguard: manual</h1><h2>Pages</h2><table class=order>{pages}</table><h2>The library, in reading order</h2>{_reading_order(site, 'index.html')}", "index.html", [])
+    order = _reading_order(site, "index.html")
+    return shell(site, "Manual", f"<h1>hullguard: manual</h1><h2>Pages</h2><table class=order>{pages}</table><h2>The library, in reading order</h2>{order}", "index.html", [])
 
 
 def write(out: Path) -> Site:
