@@ -55,11 +55,9 @@ static void alarm_step(hg_alarm *alarm, const hg_decision_config *config, uint8_
     }
     alarm->pending &= doubt; /* a group that is no longer in doubt has settled what relied on it */
     count(alarm, config, raised);
-    if (alarm->state == HG_PLANT_NONE) {
+    if ((!was_confirmed) && (alarm->state != HG_PLANT_PROVISIONAL)) { /* none; or what is no state, of a memory that failed: it must not stay */
         alarm->pending = raised ? (alarm->pending | doubt) : 0U;
-        if (alarm->up >= config->up) {
-            alarm->state = HG_PLANT_PROVISIONAL;
-        }
+        alarm->state = (alarm->up >= config->up) ? HG_PLANT_PROVISIONAL : HG_PLANT_NONE;
     }
     if ((alarm->state == HG_PLANT_PROVISIONAL) && (alarm->pending == 0U)) {
         alarm->state = HG_PLANT_CONFIRMED;

@@ -279,7 +279,7 @@ class Draw(random.Random):
             place.insert(0, json.loads(json.dumps(place[key])))
         elif how == 2 and isinstance(place, dict):
             place[self.choice((str(key)[:-1], str(key) + "s", "each", "when", "name", "x"))] = place[key]
-        elif how == 3 and isinstance(place[key], int | float) and not isinstance(place[key], bool):
+        elif how == 3 and isinstance(place[key], int | float) and not isinstance(place[key], bool) and abs(place[key]) < 1e200:
             place[key] = place[key] * self.choice((-1, 0, 0.5, 2, 1000, 1e12)) + self.choice((0, 0, 1, -1))
         elif how == 4 and isinstance(place[key], str):
             place[key] = self.text(place[key], most=1)

@@ -669,12 +669,32 @@ static void two_holds_do_not_know_of_each_other(void **state)
     assert_real(1.0, a.value[0]);
 }
 
+/* A bit of the memory that failed: what leads into the tables is within them. */
+static void an_age_that_cannot_be_leads_to_no_other_table(void **state)
+{
+    static const uint8_t ages[] = {0U, INTERVAL + 1U, UINT8_MAX};
+    static const int32_t code[WIDTH] = {4, 5};
+    (void)state;
+    for (size_t i = 0U; i < COUNT(ages); i++) {
+        rig r;
+        begin(&r);
+        assert_status(HG_OK, hg_hold_receive(&r.hold, code, false));
+        step(&r);
+        assert_status(HG_OK, hg_hold_receive(&r.hold, code, true));
+        r.hold.gap = true;
+        r.hold.gap_age = ages[i];
+        step(&r);
+        assert_int_equal((ages[i] == 0U) ? 0 : (int)(INTERVAL - 1U), (int)r.rewind);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null_and_bad_tables),
         cmocka_unit_test(start_tells_numbers_that_are_no_radii),
         cmocka_unit_test(start_tells_a_scale_of_the_other_number_type),
+        cmocka_unit_test(an_age_that_cannot_be_leads_to_no_other_table),
         cmocka_unit_test(before_the_first_frame_nothing_is_known),
         cmocka_unit_test(the_radius_follows_the_table_of_the_header),
         cmocka_unit_test(the_smaller_of_promise_and_slew_counts),

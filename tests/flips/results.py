@@ -1,0 +1,30 @@
+"""results.py SAID FILE: what `make flips` promises, from what its parts have said."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+PROMISES = {
+    "garbage": "a node, filter or observer started in memory that holds anything behaves to the bit like one started in zeros",
+    "calls": "whatever system call of the SocketCAN backend fails once, with whatever errno, is answered by a status of the header, leaves nothing open, and does no harm later",
+    "platoon-plain": "a single bit of the platoon node's memory flipped between any two calls breaks nothing, and lasting harm that nothing shows comes of no members but those of tests/flips/known.json",
+    "platoon_bank-plain": "the same of the platoon with banks, between every seventh two calls",
+    "platoon-asan": "such flips lead to no access outside an object and to no undefined arithmetic",
+}
+
+
+def main() -> None:
+    """One promise a part."""
+    said, out = Path(sys.argv[1]), Path(sys.argv[2])
+    promises = []
+    for part, promise in PROMISES.items():
+        line = next(line for line in (said / part).read_text(encoding="utf-8").splitlines() if line.startswith("  ok  "))
+        promises.append({"promise": promise, "result": line.removeprefix("  ok  ")})
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(json.dumps({"gate": "flips", "command": "make flips", "promises": promises}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
