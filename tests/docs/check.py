@@ -73,8 +73,8 @@ def unknown_statuses(headers: Sequence[Header]) -> list[str]:
     known = {m.name for h in headers for i in h.items if i.name == "hg_status" for m in i.members}
     wrong = []
     for h in headers:
-        for item in (i for i in h.items if i.kind == "function"):
-            named = set(RETVAL.findall(item.text))
+        for item, text in _functions(h):
+            named = set(RETVAL.findall(text))
             place = f"{h.path.relative_to(ROOT)}:{item.line}"
             wrong += [f"{place}: {item.name} names {name}, which is no hg_status" for name in sorted(named - known)]
             if item.result == "hg_status" and not named:
@@ -82,9 +82,14 @@ def unknown_statuses(headers: Sequence[Header]) -> list[str]:
     return wrong
 
 
+def _functions(header: Header) -> Iterator[tuple[Item, str]]:
+    """Functions, each with the comment that it may share."""
+    return ((i, group[0].text) for group in groups(header) for i in group if i.kind == "function")
+
+
 def unannounced(headers: Sequence[Header], sources: Sequence[Path]) -> list[str]:
     """Statuses that a function's own code answers and its header does not name. What it hands on from a call it makes is not looked at."""
-    named = {i.name: set(RETVAL.findall(i.text)) for h in headers for i in h.items if i.kind == "function" and i.result == "hg_status"}
+    named = {i.name: set(RETVAL.findall(text)) for h in headers for i, text in _functions(h) if i.result == "hg_status"}
     wrong = []
     for path in sources:
         for node in Parser(Language(tree_sitter_c.language())).parse(path.read_bytes()).root_node.children:

@@ -87,13 +87,13 @@ def headers() -> list[Header]:
 
 
 def groups(header: Header) -> list[list[Item]]:
-    """What a header declares, its guard left out. Macros or types on lines that follow one another share the comment of the first."""
+    """What a header declares, its guard left out. Macros, types or functions on lines that follow one another share the comment of the first."""
     found: list[list[Item]] = []
     for item in header.items:
         if item.kind == "macro" and item.name.startswith("HULLGUARD_") and item.name.endswith("_H"):
             continue
         last = found[-1][-1] if found else None
-        if last and not item.text and item.kind == last.kind in ("macro", "type") and item.follows and item.condition == last.condition:
+        if last and not item.text and item.kind == last.kind in ("macro", "type", "function") and item.follows and item.condition == last.condition:
             found[-1].append(item)
         else:
             found.append([item])
@@ -216,7 +216,7 @@ def _follows(reading: _Reading, row: int) -> bool:
     above = row - 1
     while above > 0 and re.match(r"#(if|endif)", reading.raw[above]):
         above -= 1
-    return reading.raw[above].startswith(("#define", "typedef"))
+    return re.match(r"#define|[a-z]", reading.raw[above]) is not None
 
 
 def _item(reading: _Reading, node: Node) -> list[Item]:

@@ -181,7 +181,7 @@ def _item(site: Site, group: list[Item], here: str, marked: list[str]) -> str:
     marks = "".join(f'<a id="{name}"></a>' for name in dict.fromkeys(marked))
     where = f'<span class="when">{html.escape(item.condition)}</span>' if item.condition else ""
     kind = f'<span class="kind">{item.kind}</span>'
-    code = "\n".join(i.code for i in group) if item.kind in ("macro", "type") else _signature(item) if item.kind == "function" else ""
+    code = "\n".join(i.code for i in group) if item.kind in ("macro", "type") else "\n".join(_signature(i) for i in group) if item.kind == "function" else ""
     body = f"<pre class=code>{linked(site, code, here)}</pre>" if code else ""
     members = _members(site, item, here) if item.members else ""
     return f"<section class=item>{marks}<h3>{', '.join(i.name for i in group)} {kind}{where}</h3>\n{body}{prose(site, item.text, here)}{members}</section>"

@@ -43,8 +43,12 @@ hg_status hg_digest_node(hg_digest *self, const hg_node_config *config, uint32_t
 
 /* ---- Parts of a walk: what this one, digest_tracker.h and digest_uio.h are made of ---- */
 
-/** Begin a call that takes so many numbers, and end it: HG_OK where there were no more. */
+/** Begin a call that takes so many numbers. */
 void hg_digest_open(hg_digest *self, uint32_t numbers);
+
+/** End it.
+ *  @retval HG_OK      there were no more
+ *  @retval HG_E_BUSY  there are more */
 hg_status hg_digest_close(const hg_digest *self);
 
 /** Numbers of a table, each with its 1, 2 or 4 bytes, or those of hg_real. @param[in] x  [count], may be null without one */
@@ -55,10 +59,12 @@ void hg_digest_codes(hg_digest *self, const int32_t *x, uint32_t count);
 void hg_digest_masks(hg_digest *self, const uint32_t *x, uint32_t count);
 void hg_digest_reals(hg_digest *self, const hg_real *x, uint32_t count);
 
+/** Numbers of a message's tables, of a generator's, of a threshold's. */
 void hg_digest_message(hg_digest *self, const hg_message *message);
 void hg_digest_residual(hg_digest *self, const hg_residual_config *config);
 void hg_digest_hull(hg_digest *self, const hg_hull_config *config);
 #if HG_WITH_POLYNOMIAL
+/** Of a statistical judge's. */
 void hg_digest_statistic(hg_digest *self, const hg_statistic_config *config);
 #endif
 

@@ -17,7 +17,9 @@ extern "C" {
 hg_status hg_digest_uio(hg_digest *self, const hg_uio_config *uio, uint8_t uios, uint32_t numbers);
 
 #if !HG_REAL_Q31
-/** The same for what tells causes apart. @param[in] isolate  [isolates] */
+/** The same for what tells causes apart.
+ *  @param[in] isolate  [isolates]
+ *  @retval HG_OK  that was the last one  @retval HG_E_BUSY  there are more */
 hg_status hg_digest_isolate(hg_digest *self, const hg_isolate_config *isolate, uint8_t isolates, uint32_t numbers);
 #endif
 

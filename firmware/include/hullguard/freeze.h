@@ -33,16 +33,17 @@
 extern "C" {
 #endif
 
+/* What a freeze frame is doing. 0 is not a good state. */
 typedef enum {
     HG_FREEZE_OFF       = 0, /* not started */
-    HG_FREEZE_RECORDING = 1,
+    HG_FREEZE_RECORDING = 1, /* every sample is entered, the oldest is overwritten */
     HG_FREEZE_CLOSING   = 2, /* an alarm was confirmed; the samples after it, or the checksum, are still missing */
     HG_FREEZE_FROZEN    = 3  /* can be read */
 } hg_freeze_state;
 
-#define HG_FREEZE_STATE 1U /* commands */
-#define HG_FREEZE_READ 2U
-#define HG_FREEZE_CLEAR 3U
+#define HG_FREEZE_STATE 1U /* command: tell the state */
+#define HG_FREEZE_READ 2U  /* command: hand out words */
+#define HG_FREEZE_CLEAR 3U /* command: record anew */
 #define HG_FREEZE_NO_WORD 0xFFFFU /* the place of a response that tells the state */
 
 typedef struct {                /* flash: one a model, generated */
@@ -54,9 +55,9 @@ typedef struct {                /* flash: one a model, generated */
 } hg_freeze_config;
 
 typedef struct {           /* what a sample was judged to be */
-    uint32_t k;
-    uint32_t candidates;
-    uint16_t bus;
+    uint32_t k;            /* sample */
+    uint32_t candidates;   /* as in hg_verdict, */
+    uint16_t bus;          /* and so is this */
     hg_plant plant;
     hg_basis basis;
 } hg_freeze_row;
@@ -73,7 +74,7 @@ typedef struct {               /* RAM: one a node */
     const hg_freeze_config *config;
     const hg_detector      *detector;
     hg_freeze_memory        memory;
-    uint32_t                model_hash;
+    uint32_t                model_hash; /* of the node's tables */
     uint32_t                crc;       /* of the words summed so far */
     uint32_t                summed;    /* words */
     uint32_t                next;      /* word to hand out, up to */

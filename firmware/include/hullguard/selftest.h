@@ -27,8 +27,9 @@ typedef struct {                /* flash: one a model, generated */
     uint32_t       digest;      /* CRC-32C over what the drive must give (crc32c.h), for this number type */
 } hg_selftest_config;
 
+/* What a drive gave. */
 typedef struct {
-    uint32_t digest;
+    uint32_t digest;   /* CRC-32C over it */
     bool     quiet;    /* no alarm before the fault */
     bool     found;    /* confirmed in the last sample */
 } hg_selftest_result;
