@@ -7,6 +7,6 @@ docs: ## build/docs/: the headers as a manual, and all pages, as HTML; fails whe
 figures: lib ## make every picture and every measured table of the documentation again, from commands
 	@$(PY) tests/docs/figures.py
 
-figures-check: lib
-	@$(PY) tests/docs/figures.py --check
+figures-check: lib ## are they what their commands make? ONLY="monitor.svg ..": only these pictures
+	@$(PY) tests/docs/figures.py --check $(ONLY)
 CHECK_PARTS += docs figures-check
