@@ -335,6 +335,9 @@ PICTURE: dict[str, Callable[[Path], None]] = {
 }  # fmt: skip
 
 
+ELSEWHERE = ("motor.png",)  # of the tutorial, whose run made it: not made again here
+
+
 # ---- all of it ----
 
 
