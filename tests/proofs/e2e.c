@@ -4,6 +4,8 @@
 
 #include "hullguard/e2e.h"
 
+#define NUMBERS 1024U /* four turns of the longest counter */
+
 /* Any configuration: profile PROFILE where that is defined. */
 static hg_e2e_config any_config(const uint8_t *ids, const hg_e2e_limits *limits)
 {
@@ -145,9 +147,13 @@ void proof_e2e_valid(void)
 /** No stale and no repeated frame is accepted: after a frame with the absolute number a, one with the number b is in sequence just when (b - a), modulo the counter's
  *  turn, is 1 .. step (a whole turn for a counter that has not moved in another frame); lost is one less; the last good frame once more is refused without a change; after a
  *  jump `resync` frames in sequence are refused.
- *  Any profile, any two numbers, any step, resynchronisation or none.
+ *  Any profile, any two numbers below NUMBERS, any step, resynchronisation or none.
  *  @proves hg_e2e_sequence hg_e2e_repeated hg_e2e_receiver_start hg_e2e_modulus
- *  @run check real=f32 unwind=2 limit=30 */
+ *  @run check real=f32 unwind=2 limit=60 PROFILE=HG_E2E_P01
+ *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P22
+ *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P05
+ *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_NONE
+ *  @run deep real=f32 unwind=2 limit=3600 */
 void proof_e2e_sequence(void)
 {
     uint8_t ids[HG_E2E_IDS];
@@ -158,7 +164,7 @@ void proof_e2e_sequence(void)
     prove(modulus == turns[config.profile], "the values of its counter");
     const uint32_t a = any_u32();
     const uint32_t b = any_u32();
-    assume((a < 65536U) && (b < 65536U));
+    assume((a < NUMBERS) && (b < NUMBERS));
     const bool first = any_bool();
     hg_e2e_receiver self = {.crc = any_u16(), .counter = (uint8_t)(a % modulus), .stamp = any_u8_in(0U, 15U), .resync = any_u8(), .seen = true};
     if (first) {
@@ -173,7 +179,7 @@ void proof_e2e_sequence(void)
     const bool twice = counted && before.seen && (header.counter == before.counter) && (header.crc == before.crc) && (header.stamp == before.stamp);
     prove(hg_e2e_repeated(&config, &self, &header) == twice, "the last good frame once more");
     const hg_status status = hg_e2e_sequence(&config, &self, &header, step, &progress);
-    const uint32_t turn = (b + (modulus * 65536U) - a) % modulus;
+    const uint32_t turn = (b + (modulus * NUMBERS) - a) % modulus;
     const uint32_t moved = first ? 1U : ((turn == 0U) ? modulus : turn);
     if (!counted) {
         prove((status == HG_OK) && (progress.lost == 0U) && (!progress.continues), "nothing is known without a counter");

@@ -5,10 +5,10 @@
 #include "hullguard/variance.h"
 
 /** The running sums are those of the samples in the window, exactly, and the sensor is silent only with a full window; null pointers and numbers out of range are refused.
- *  A window of WINDOW, SAMPLES samples of any codes of magnitude up to CODE, with and without trend.
+ *  A window of WINDOW, SAMPLES samples of any codes of BITS bits, with and without trend.
  *  @proves hg_variance_start hg_variance_step
- *  @run check real=f32 unwind=8 limit=60 WINDOW=3U SAMPLES=5U CODE=7
- *  @run deep real=f32 unwind=10 limit=3600 WINDOW=4U SAMPLES=8U CODE=31 */
+ *  @run check real=f32 unwind=8 limit=60 WINDOW=3U SAMPLES=5U BITS=4
+ *  @run deep real=f32 unwind=10 limit=3600 WINDOW=4U SAMPLES=8U BITS=8 */
 void proof_variance_sums(void)
 {
     int16_t memory[WINDOW];
@@ -22,7 +22,10 @@ void proof_variance_sums(void)
           "null pointers");
     prove(hg_variance_start(&self, &config, memory) == HG_OK, "it starts");
     for (uint8_t k = 0U; k < SAMPLES; k++) {
-        y[k] = (int16_t)any_i32_in(-CODE, CODE);
+        struct {
+            signed int code : BITS;
+        } any_code;
+        y[k] = (int16_t)any_code.code;
         const hg_status status = hg_variance_step(&self, y[k]);
         prove((status == HG_OK) || (status == HG_E_EMPTY), "no other status");
         prove(((k + 1U) >= WINDOW) || (status == HG_OK), "it speaks until the window is full");
