@@ -54,6 +54,8 @@ NEAR = {
     "platoon_bank": {"residuals": 0.95, "banks": 0.95},
     "platoon_bank-together": {"residuals": 0.8, "banks": 0.9},
     "openacc": {"residuals": 0.98},
+    "dc_motor": {"residuals": 0.95, "banks": 0.95},
+    "battery_pack": {"residuals": 0.95},
     "suspension": {"residuals": 0.93, "estimates": 0.99},
     "suspension_published": {"residuals": 0.5, "estimates": 0.9},
 }
