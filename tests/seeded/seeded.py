@@ -79,8 +79,13 @@ def tree() -> set[Path]:
             here = Path(folder).relative_to(ROOT)
             if here == BUILD:
                 below[:] = [name for name in below if name not in ("seeded", "results")]
-            files.update(here / name for name in names)
+            files.update(here / name for name in names + links(Path(folder), below))
     return files
+
+
+def links(folder: Path, below: list[str]) -> list[str]:
+    """Which of these folders are links: a copy has the link, not what it points to."""
+    return [name for name in below if (folder / name).is_symlink()]
 
 
 def stamp(file: Path) -> tuple[int, int] | None:
@@ -114,7 +119,7 @@ class Copy:
             here = Path(folder)
             if here == self.root / BUILD:
                 below[:] = [name for name in below if name != "seeded"]
-            for name in names:
+            for name in names + [link for link in links(here, below) if link != ".venv"]:
                 if (here / name).relative_to(self.root) not in self._files:
                     (here / name).unlink()
         for file in self._files:
