@@ -31,9 +31,9 @@ $(FLIPS)/calls/syscalls: $(FLIPS)/calls/hal/socketcan/socketcan.o $(FLIPS)/calls
 # What a part says goes to a file as well, from which the results are made. $(call flips_part,NAME,COMMAND)
 flips_part = mkdir -p $(FLIPS)/said; $(2) >$(FLIPS)/said/$(1) 2>&1 || { cat $(FLIPS)/said/$(1); exit 1; }; cat $(FLIPS)/said/$(1)
 # $(call flips_model,MODEL,BUILD,STRIDE)
-flips_model = $(call flips_part,$(1)-$(2),$(PY) tests/flips/flips.py $(1) $(FLIPS)/$(2)/$(1) $(FLIPS)/work-$(2) --stride $(3))
+flips_model = $(call flips_part,$(1)-$(2),PYTHONPATH=host_tools $(PY) tests/flips/flips.py $(1) $(FLIPS)/$(2)/$(1) $(FLIPS)/work-$(2) --stride $(3))
 
-.PHONY: flips flips-deep
+.PHONY: flips flips-deep flips-garbage flips-calls flips-platoon
 CHECK_PARTS += flips
 flips: lib $(FLIPS_MODELS:%=$(FLIPS)/plain/%) $(FLIPS_MODELS:%=$(FLIPS)/asan/%) $(FLIPS)/asan/garbage $(FLIPS)/calls/syscalls $(WITH_VCAN) ## every single bit of a node's memory flipped, starts in garbage, every system call failing once
 	@$(call flips_part,garbage,$(FLIPS)/asan/garbage)
@@ -42,6 +42,13 @@ flips: lib $(FLIPS_MODELS:%=$(FLIPS)/plain/%) $(FLIPS_MODELS:%=$(FLIPS)/asan/%) 
 	@$(call flips_model,platoon_bank,plain,$(FLIPS_STRIDE))
 	@$(call flips_model,platoon,asan,$(FLIPS_STRIDE))
 	@$(PY) tests/flips/results.py $(FLIPS)/said $(BUILD)/results/flips.json
+# Parts of it.
+flips-garbage: $(FLIPS)/asan/garbage
+	@$(call flips_part,garbage,$<)
+flips-calls: $(FLIPS)/calls/syscalls $(WITH_VCAN)
+	@$(call flips_part,calls,$(WITH_VCAN) -t 300 $<)
+flips-platoon: lib $(FLIPS)/plain/platoon
+	@$(call flips_model,platoon,plain,1)
 DEEP_PARTS += flips-deep
 flips-deep: lib $(FLIPS_DEEP:%=$(FLIPS)/plain/%) $(FLIPS_DEEP:%=$(FLIPS)/asan/%) ## the same of all detector models, between any two calls, and under the sanitizers
 	@$(foreach m,$(FLIPS_DEEP),$(call flips_model,$(m),plain,1);)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import cffi
+
 from hullguard.core.library import library
 from hullguard.core.native import Native, Plant, Sender
 from hullguard.design.design import design

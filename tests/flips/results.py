@@ -9,7 +9,7 @@ from pathlib import Path
 PROMISES = {
     "garbage": "a node, filter or observer started in memory that holds anything behaves to the bit like one started in zeros",
     "calls": "whatever system call of the SocketCAN backend fails once, with whatever errno, is answered by a status of the header, leaves nothing open, and does no harm later",
-    "platoon-plain": "a single bit of the platoon node's memory flipped between any two calls breaks nothing, and lasting harm that nothing shows comes of no members but those of tests/flips/known.json",
+    "platoon-plain": "a bit of the platoon node's memory flipped between any two calls breaks nothing; lasting harm that nothing shows comes of members in known.json only",
     "platoon_bank-plain": "the same of the platoon with banks, between every seventh two calls",
     "platoon-asan": "such flips lead to no access outside an object and to no undefined arithmetic",
 }

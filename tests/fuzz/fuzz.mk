@@ -24,12 +24,18 @@ endef
 $(foreach e,$(FUZZ_ENGINES),$(eval $(call fuzz_engine,$(e))))
 
 fuzz_programs = $(foreach e,$(1),$(FUZZ_TARGETS:%=$(FUZZ)/$(e)/%))
-fuzz_run = $(PY) tests/fuzz/fuzz.py --build $(FUZZ) $(1) $(FUZZ_TARGETS)
+fuzz_run = PYTHONPATH=host_tools $(PY) tests/fuzz/fuzz.py --build $(FUZZ) $(1)
 
-.PHONY: fuzz fuzz-quick
+.PHONY: fuzz fuzz-quick fuzz-readers $(FUZZ_TARGETS:%=fuzz-%)
 CHECK_PARTS += fuzz-quick
 fuzz-quick: lib $(call fuzz_programs,libfuzzer) ## fuzzing, short: corpus and regressions of all targets, 15 s each, some thousand cases a reader of files
-	@$(call fuzz_run,quick --seconds $(FUZZ_SECONDS))
+	@$(call fuzz_run,quick --seconds $(FUZZ_SECONDS) $(FUZZ_TARGETS))
 DEEP_PARTS += fuzz
 fuzz: lib $(call fuzz_programs,$(FUZZ_ENGINES)) ## fuzzing, long: RUNTIME seconds a target and engine, 10^5 cases a reader; adds to tests/fuzz/ledger.toml
-	@$(call fuzz_run,long --seconds $(RUNTIME))
+	@$(call fuzz_run,long --seconds $(RUNTIME) $(FUZZ_TARGETS))
+
+# Parts of the short form: one target, or the readers alone (READER).
+$(FUZZ_TARGETS:%=fuzz-%): fuzz-%: $(FUZZ)/libfuzzer/%
+	@$(call fuzz_run,quick --seconds $(FUZZ_SECONDS) --no-readers $*)
+fuzz-readers: lib
+	@PYTHONPATH=host_tools $(PY) tests/fuzz/readers.py --work $(FUZZ)/readers --seed 1 $(READER:%=--reader %)
