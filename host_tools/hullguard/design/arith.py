@@ -12,6 +12,11 @@ from hullguard.model.table import Array
 U32 = 2.0**-24  # unit roundoff of float32
 
 
+def gamma32(terms: int) -> float:
+    """Largest share of sum |a_i x_i| that a float32 sum of products loses where no number passes more roundings than `terms` (proved: tests/gappa)."""
+    return terms * U32 / (1 - terms * U32)
+
+
 def mul(a: Array, b: Array) -> Array:
     """A b, summed in index order."""
     out = np.zeros((a.shape[0], b.shape[1]))

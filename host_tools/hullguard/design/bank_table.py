@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hullguard.design.arith import U32, digits, mul, nearest32, row_sums, up32
+from hullguard.design.arith import digits, gamma32, mul, nearest32, row_sums, up32
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.reach import largest
 from hullguard.design.store import Stored
@@ -54,7 +54,7 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     form = window_form(model.plant, bank.window, varying)
     weight = nearest32(full_weight(model, form, nearest32(bank.weight)))
     terms = bank.window * (len(model.signals) + form.Me.shape[1] // bank.window) + 4
-    gamma = terms * U32 / (1 - terms * U32)
+    gamma = gamma32(terms)
     widen = float(up32(np.array((1 + gamma) * (1 + gamma) * DOUBLE)))
     values = _values(model, stored, bank)
     bias = _healthy(model, form, weight, _states(model, stored, bank, fault_size), values[model.inputs])

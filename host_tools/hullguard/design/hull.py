@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hullguard.design.arith import U32, digits, mul, nearest32, powers, row_sums, up32
+from hullguard.design.arith import U32, digits, gamma32, mul, nearest32, powers, row_sums, up32
 from hullguard.design.observer import SubPlant
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -105,7 +105,7 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     """
     s, width = lin.input.shape
     m = plant.C.shape[0]
-    gamma = 0.0 if fixed else (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    gamma = 0.0 if fixed else gamma32(s + width + 2)
     x, u, v = ranges.state[:, None], ranges.input[:, None], ranges.value[:, None]
     widest = np.concatenate([2 * ranges.value, ranges.derived])[:, None]
     G, E, F, D = np.abs(lin.state), np.abs(lin.input), np.abs(lin.output), np.abs(lin.direct)

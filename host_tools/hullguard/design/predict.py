@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hullguard.design.arith import U32, mul, nearest32, row_sums, up32
+from hullguard.design.arith import gamma32, mul, nearest32, row_sums, up32
 from hullguard.design.tables import GroupTable, PredictTable, rows
 from hullguard.errors import InputError
 from hullguard.model.plant import Plant
@@ -133,8 +133,7 @@ class _Rounded:
     @property
     def gamma(self) -> float:
         """Relative rounding of a sum as long as the longest row."""
-        n = self.plant.n + self.plant.p + len(self.half) + 4
-        return n * U32 / (1 - n * U32)
+        return gamma32(self.plant.n + self.plant.p + len(self.half) + 4)
 
 
 def _hidden(t: _Rounded, horizon: int) -> tuple[int | None, Array]:

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from hullguard.design import hull
-from hullguard.design.arith import U32, digits, mul, nearest32, row_sums, up32
+from hullguard.design.arith import U32, digits, gamma32, mul, nearest32, row_sums, up32
 from hullguard.design.observer import SubPlant
 from hullguard.design.tables import rows
 from hullguard.design.zonotope_table import BOX, TRUNCATE, ZonotopeTable
@@ -196,7 +196,7 @@ def _relative(error: Array, columns: Array) -> Array:
 def _growth(lin: hull.Linear, bd: Array, found: Modal, kept: _Stored, terms: int) -> Array:
     """Share of the set's size by which a step can miss each row: tables, arithmetic of the threshold, arithmetic of the generator."""
     Y, s, width = found.transform, len(found.transform), lin.input.shape[1]
-    gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    gamma = gamma32(s + width + 2)
     aY, tiny = np.abs(Y), 4 * (s + 1) * U64
     state = np.abs(mul(Y, lin.state) - mul(kept.Lam, Y)) + tiny * (mul(aY, np.abs(lin.state)) + mul(np.abs(kept.Lam), aY))
     state = mul(state + gamma * mul(aY, np.abs(lin.state)), np.abs(found.inverse) + found.miss).max(1)
@@ -211,7 +211,7 @@ def _growth(lin: hull.Linear, bd: Array, found: Modal, kept: _Stored, terms: int
 def _output_growth(lin: hull.Linear, found: Modal, kept: _Stored) -> Array:
     """The same for each residual."""
     s, width = lin.input.shape
-    gamma = (s + width + 2) * U32 / (1 - (s + width + 2) * U32)
+    gamma = gamma32(s + width + 2)
     F = np.abs(lin.output)
     exact = mul(lin.output, found.inverse) * (1 + kept.wider)
     error = np.abs(kept.Q - exact) + 2 * mul(F, found.miss) + gamma * mul(F, np.abs(found.inverse) + found.miss) + (s + 4) * U32 * np.abs(kept.Q)
