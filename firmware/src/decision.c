@@ -71,8 +71,9 @@ hg_plant hg_decision_step(hg_decision *self, const hg_evidence *evidence, uint32
 {
     const hg_decision_config *config = self->config;
     hg_plant plant = evidence->ready ? HG_PLANT_NONE : HG_PLANT_STARTING;
+    const uint8_t judged = HG_SIZE(HG_ONLY_JUDGED, config->generators);
     uint32_t common = 0U;
-    for (uint8_t g = 0U; g < HG_SIZE(HG_ONLY_JUDGED, config->generators); g++) {
+    for (uint8_t g = 0U; g < judged; g++) {
         hg_alarm *alarm = &self->alarm[g];
         alarm_step(alarm, config, config->feeds[g], ((evidence->alarm >> g) & 1U) != 0U, evidence);
         if (alarm->state != HG_PLANT_NONE) {

@@ -82,7 +82,7 @@ static uint32_t invalid_pattern(const hg_field *field)
     if ((field->flags & HG_FIELD_FLOAT32) != 0U) {
         pattern = FLOAT32_QUIET_NAN;
     } else if ((field->flags & HG_FIELD_SIGNED) != 0U) {
-        pattern = (uint32_t)1U << (field->length - 1U);
+        pattern = (uint32_t)1U << (field->length - 1U); /* NOLINT(clang-analyzer-core.BitwiseShift): a length is at least 1, hg_frame_valid() */
     } else {
         /* all ones */
     }

@@ -386,7 +386,7 @@ static void expand_states(hg_polynomial *self)
         shift[0] = self->ekf[l];
         for (uint8_t j = 0U; j < p; j++) {
             const hg_real *H = &self->poly[((uint32_t)config->lifted + j) * ring];
-            for (uint16_t m = 1U; m < ring; m++) {
+            for (uint32_t m = 1U; m < ring; m++) {
                 shift[m] -= self->L[spot(p, l, j)] * H[m];
             }
         }

@@ -186,7 +186,11 @@ static hg_status try_send(hg_socketcan *self, const hg_can_frame *frame)
             (void)clock_nanosleep(CLOCK_MONOTONIC, 0, &pause, NULL);   /* POLLOUT says nothing about a full interface queue */
         }
         const ssize_t written = send(self->can, &raw, size, MSG_NOSIGNAL);
-        status = (written == (ssize_t)size) ? HG_OK : ((written < 0) ? send_result(self) : HG_E_IO);
+        if (written == (ssize_t)size) {
+            status = HG_OK;
+        } else {
+            status = (written < 0) ? send_result(self) : HG_E_IO;
+        }
     }
     return status;
 }

@@ -75,7 +75,7 @@ uint64_t hg_board_now_us(void)
         start_counter();
     }
     const uint32_t now = read_counter();
-    timer.ticks += (uint32_t)(now - timer.last);
+    timer.ticks += now - timer.last;
     timer.last = now;
     return (timer.ticks * CYCLES_PER_TICK) / HG_ZYNQMP_PROCESSOR_MHZ;
 }
