@@ -102,13 +102,13 @@ hg_status hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *radiu
         return HG_E_EMPTY;
     }
     add_window(self, value, radius);
-    self->closest = 0U;
     for (uint8_t c = 0U; c < config->certificates; c++) {
         const hg_real residual = hg_acc_real(self->sum[c], config->exponent);
         const hg_real threshold = hg_real_add(config->bias[c], hg_acc_real(self->sum[(uint16_t)c + config->certificates], config->exponent));
         if ((!hg_real_finite(residual)) || (!hg_real_finite(threshold))) {
             *r = HG_REAL_ZERO;
             *J = config->bias[0];
+            self->closest = 0U;
             return HG_E_NUMERIC;
         }
         if ((c == 0U) || nearer(residual, threshold, *r, *J)) {

@@ -119,6 +119,47 @@ static void validity_looks_at_every_number_and_table(void **state)
     assert_true(hg_bank_valid(&c[6], VALUES, RADII, LENGTH));
 }
 
+/* One certificate is a bank. */
+static void the_smallest_bank_is_taken(void **state)
+{
+    (void)state;
+    hg_bank_config c = usual;
+    c.certificates = 1U;
+    c.window = 1U;
+    c.width = 1U;
+    assert_true(hg_bank_valid(&c, VALUES, RADII, 1U));
+}
+
+/* The closest of two certificates, of |r| 1/2 or 1 or 2 at thresholds that are their biases: of a window of one sample whose radius is 0. */
+static uint8_t closest_of(double r0, double J0, double r1, double J1)
+{
+    static rig b;
+    const hg_real weight[2] = {R(r0), R(r1)};
+    const hg_real bias[2] = {R(J0), R(J1)};
+    const hg_bank_config c = {.certificates = 2U, .window = 1U, .width = 1U, .signal = signal_list, .weight = weight, .bias = bias, .widen = R(1)};
+    const hg_real value[VALUES] = {R(1), R(1), R(1)};
+    const hg_real radius[RADII] = {R(0)};
+    begin(&b, &c);
+    assert_status(HG_OK, step(&b, value, radius));
+    assert_real((b.self.closest == 0U) ? r0 : r1, b.r[0]);
+    assert_real((b.self.closest == 0U) ? J0 : J1, b.J[0]);
+    return b.self.closest;
+}
+
+/* At its threshold a certificate raises no alarm: it is nearer than one below, and further than one above. */
+static void at_its_threshold_a_certificate_is_between(void **state)
+{
+    (void)state;
+    assert_int_equal(1, closest_of(0.5, 1.0, -1.0, 1.0));
+    assert_int_equal(0, closest_of(-1.0, 1.0, 0.5, 1.0));
+    assert_int_equal(1, closest_of(1.0, 1.0, 2.0, 1.5));
+    assert_int_equal(0, closest_of(2.0, 1.5, 1.0, 1.0));
+    assert_int_equal(1, closest_of(0.0, 0.0, 2.0, 1.0)); /* nothing at a threshold of nothing */
+    assert_int_equal(0, closest_of(2.0, 1.0, 0.0, 0.0));
+    assert_int_equal(0, closest_of(2.0, 0.5, 2.0, 1.0)); /* of two alarms the greater one */
+    assert_int_equal(1, closest_of(2.0, 1.0, 2.0, 0.5));
+}
+
 static void validity_looks_at_every_place(void **state)
 {
     (void)state;
@@ -130,6 +171,7 @@ static void validity_looks_at_every_place(void **state)
         assert_false(hg_bank_valid(&c, VALUES, RADII, LENGTH));
         places[g] = VALUES - 1U;
         assert_true(hg_bank_valid(&c, VALUES, RADII, LENGTH));
+        assert_false(hg_bank_valid(&c, VALUES, VALUES - 1U, LENGTH)); /* has a value and no radius */
         places[g] = 255U;
         assert_false(hg_bank_valid(&c, 255U, 255U, LENGTH));
         c = usual;
@@ -432,6 +474,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null),
         cmocka_unit_test(validity_looks_at_every_number_and_table),
+        cmocka_unit_test(the_smallest_bank_is_taken),
+        cmocka_unit_test(at_its_threshold_a_certificate_is_between),
         cmocka_unit_test(validity_looks_at_every_place),
         cmocka_unit_test(a_window_of_one_computes_by_hand),
         cmocka_unit_test(nothing_is_said_before_the_window_is_full),

@@ -185,6 +185,27 @@ static void debounce_counts_samples_in_a_row(void **state)
     }
 }
 
+/* However long it was quiet while the alarm was in doubt: the count stays at its limit. */
+static void a_long_quiet_is_not_forgotten(void **state)
+{
+    (void)state;
+    static const uint8_t limits[] = {1U, 7U, 255U};
+    for (size_t i = 0U; i < COUNT(limits); i++) {
+        hg_decision_config c = usual;
+        c.down = limits[i];
+        for (uint32_t quiet = 250U; quiet < 520U; quiet++) {
+            rig r;
+            begin(&r, &c);
+            assert_int_equal(HG_PLANT_PROVISIONAL, step(&r, 1U, 1U, 0U));
+            for (uint32_t k = 0U; k < quiet; k++) {
+                assert_int_equal(HG_PLANT_PROVISIONAL, step(&r, 0U, 1U, 0U));
+            }
+            assert_int_equal(HG_PLANT_CONFIRMED, step(&r, 0U, 0U, 0U));
+            assert_int_equal(((quiet + 2U) >= limits[i]) ? HG_PLANT_NONE : HG_PLANT_CONFIRMED, step(&r, 0U, 0U, 0U));
+        }
+    }
+}
+
 static void a_latched_alarm_stays_until_reset(void **state)
 {
     (void)state;
@@ -347,6 +368,7 @@ int main(void)
         cmocka_unit_test(a_rewind_takes_the_alarm_back_and_judges_anew),
         cmocka_unit_test(a_rewound_alarm_counts_up_from_the_start),
         cmocka_unit_test(debounce_counts_samples_in_a_row),
+        cmocka_unit_test(a_long_quiet_is_not_forgotten),
         cmocka_unit_test(a_latched_alarm_stays_until_reset),
         cmocka_unit_test(candidates_move_every_generator_in_alarm),
         cmocka_unit_test(candidates_narrow_over_an_episode_and_are_all_there_again_after_it),

@@ -252,6 +252,40 @@ static void only_the_exact_kind_of_frame_matches(void **state)
     assert_true(hg_frame_matches(&message, &wrong));
 }
 
+/* As many signals as there may be, of two bits each. */
+static void the_widest_message_is_valid(void **state)
+{
+    (void)state;
+    static hg_field field[HG_GROUP_SIGNALS_MAX];
+    static hg_code_scale scale[HG_GROUP_SIGNALS_MAX];
+    for (uint8_t g = 0U; g < HG_GROUP_SIGNALS_MAX; g++) {
+        field[g] = (hg_field){(uint16_t)(16U + (2U * g)), 2U, 0U};
+        scale[g] = scale_of(1.0, 0, 2);
+    }
+    hg_message m = message_of(field, scale);
+    m.flags = HG_CAN_FD;
+    m.length = 64U;
+    m.width = HG_GROUP_SIGNALS_MAX;
+    assert_true(hg_frame_valid(&m));
+    m.width = HG_GROUP_SIGNALS_MAX + 1U;
+    assert_false(hg_frame_valid(&m));
+}
+
+/* A field of no bits carries not even a signal that is always 0. */
+static void a_field_of_no_bits_is_invalid(void **state)
+{
+    (void)state;
+    const hg_code_scale scale = scale_of(1.0, 0, 0);
+    static const uint8_t flags[] = {0U, HG_FIELD_SIGNED};
+    for (size_t i = 0U; i < COUNT(flags); i++) {
+        hg_field field = {16U, 1U, flags[i]};
+        const hg_message m = message_of(&field, &scale);
+        assert_true(hg_frame_valid(&m));
+        field.length = 0U;
+        assert_false(hg_frame_valid(&m));
+    }
+}
+
 static void messages_that_no_frame_can_carry_are_invalid(void **state)
 {
     (void)state;
@@ -402,6 +436,8 @@ int main(void)
         cmocka_unit_test(an_integer_outside_the_scale_is_refused),
         cmocka_unit_test(a_float_that_is_no_value_is_refused),
         cmocka_unit_test(only_the_exact_kind_of_frame_matches),
+        cmocka_unit_test(the_widest_message_is_valid),
+        cmocka_unit_test(a_field_of_no_bits_is_invalid),
         cmocka_unit_test(messages_that_no_frame_can_carry_are_invalid),
         cmocka_unit_test(fields_outside_the_frame_or_of_no_type_are_invalid),
         cmocka_unit_test(a_scale_wider_than_its_field_is_invalid),

@@ -210,6 +210,73 @@ static void start_tells_numbers_that_are_no_radii(void **state)
     assert_untouched(reals, COUNT(reals));
 }
 
+/* Whatever was in the memory: no frame seen, nothing sent, nothing promised. */
+static void a_start_leaves_nothing_undefined(void **state)
+{
+    (void)state;
+    static const int patterns[] = {0x00, 0x5A, 0xFF};
+    for (size_t i = 0U; i < COUNT(patterns); i++) {
+        rig r;
+        (void)memset(&r, patterns[i], sizeof(r));
+        assert_status(HG_OK, hg_hold_start(&r.hold, &usual, r.codes, r.reals));
+        assert_int_equal(UINT8_MAX, hg_hold_age(&r.hold));
+        assert_int_equal(0, r.hold.good);
+        assert_int_equal(0, r.hold.level);
+        assert_int_equal(0, r.hold.silence);
+        assert_int_equal(0, r.hold.gap_age);
+        assert_true(r.hold.holes);
+        assert_false(r.hold.seen || r.hold.recovering || r.hold.fresh || r.hold.lost || r.hold.doubt || r.hold.gap);
+        for (size_t g = 0U; g < WIDTH; g++) {
+            assert_int_equal(HG_CODE_INVALID, r.hold.sent[g]);
+            assert_int_equal(HG_CODE_INVALID, r.hold.previous[g]);
+            assert_real(middle_table[g], r.hold.value[g]);
+            assert_real(HG_REAL_MAX, r.hold.promise[g]);
+        }
+    }
+}
+
+/* A threshold of 0 is one: the sender speaks of every step of its code. */
+static void a_promise_of_no_threshold_is_the_rounding_alone(void **state)
+{
+    (void)state;
+    const uint8_t silence[2] = {0U, 0U};
+    const uint16_t delta[2 * WIDTH] = {0U};
+    const int32_t sigma[2 * WIDTH] = {0, 0, 4, 4};
+    const int32_t activity[2 * WIDTH] = {0, 0, 300, 300};
+    hg_trigger_config exact = trigger;
+    exact.levels = 2U;
+    exact.silence = silence;
+    exact.delta = delta;
+    exact.sigma = sigma;
+    exact.activity = activity;
+    hg_hold_config c = usual;
+    c.trigger = &exact;
+    rig r;
+    begin(&r);
+    assert_status(HG_OK, hg_hold_start(&r.hold, &c, r.codes, r.reals));
+    frame(&r, 100, -100, true);
+    frame(&r, 100, -100, true); /* two in a row: level 0 */
+    step(&r);
+    assert_real(half_table[0], r.radius[0]);
+    assert_real(half_table[1], r.radius[1]);
+}
+
+/* The sender's silence says nothing of a signal that has no value: it is nothing to be in doubt about. */
+static void a_signal_without_a_value_promises_nothing(void **state)
+{
+    (void)state;
+    rig r;
+    begin(&r);
+    frame(&r, 100, -100, true);
+    frame(&r, HG_CODE_INVALID, HG_CODE_INVALID, true);
+    for (uint32_t j = 1U; j < INTERVAL; j++) {
+        step(&r);
+        assert_false(hg_hold_doubt(&r.hold));
+        assert_real(span_table[0], r.radius[0]);
+        assert_real(span_table[1], r.radius[1]);
+    }
+}
+
 static void before_the_first_frame_nothing_is_known(void **state)
 {
     (void)state;
@@ -226,6 +293,7 @@ static void before_the_first_frame_nothing_is_known(void **state)
             assert_real(span_table[g], r.radius[g]);
         }
         assert_int_equal(0, r.rewind);
+        assert_int_equal(UINT8_MAX, hg_hold_age(&r.hold));
         assert_false(hg_hold_doubt(&r.hold));
         assert_int_equal(HG_BUS_ABSENT, hg_hold_health(&r.hold));
     }
@@ -695,6 +763,9 @@ int main(void)
         cmocka_unit_test(start_tells_numbers_that_are_no_radii),
         cmocka_unit_test(start_tells_a_scale_of_the_other_number_type),
         cmocka_unit_test(an_age_that_cannot_be_leads_to_no_other_table),
+        cmocka_unit_test(a_start_leaves_nothing_undefined),
+        cmocka_unit_test(a_promise_of_no_threshold_is_the_rounding_alone),
+        cmocka_unit_test(a_signal_without_a_value_promises_nothing),
         cmocka_unit_test(before_the_first_frame_nothing_is_known),
         cmocka_unit_test(the_radius_follows_the_table_of_the_header),
         cmocka_unit_test(the_smaller_of_promise_and_slew_counts),

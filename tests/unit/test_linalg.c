@@ -140,6 +140,13 @@ static void root_is_the_square_root(void **state)
     for (size_t i = 0U; i < COUNT(squares); i++) {
         assert_near(1.0, (double)hg_linalg_root(R(squares[i])) / sqrt(squares[i]), 3e-7);
     }
+    const double step = (sizeof(hg_real) == 4U) ? (double)FLT_EPSILON : 2.0 * DBL_EPSILON; /* the reference rounds too */
+    for (int i = 0; i < 30000; i++) { /* all of 1 .. 4: what is left of Newton's iteration is less than a step of the number type */
+        const hg_real x = R(1) + (R(i) * R(1e-4));
+        assert_near(1.0, (double)hg_linalg_root(x) / sqrt((double)x), step);
+    }
+    assert_near(1.0, (double)hg_linalg_root(R(FLT_MIN)) / sqrt((double)FLT_MIN), step);
+    assert_near(1.0, (double)hg_linalg_root(R(FLT_MAX)) / sqrt((double)FLT_MAX), step);
     assert_real(8.0, hg_linalg_root(R(64)));
     assert_true(hg_linalg_root(R(0)) < R(1e-20));
 }

@@ -153,6 +153,28 @@ static void a_sender_refuses_null_and_contradictions(void **state)
     }
 }
 
+/* Every signal is coded by its own scale. */
+static void a_sender_sends_each_signal_by_its_own_scale(void **state)
+{
+    (void)state;
+    hg_sender self;
+    int32_t codes[(2U * 2U) + 1U];
+    hg_can_frame frame;
+    int32_t code[2];
+    const hg_code_scale scale[2] = {sm_scale[0], {R(0.5), R(10), R(2), 0, -SM_LIMIT, SM_LIMIT}};
+    hg_message message = messages[0];
+    message.scale = scale;
+    const hg_sender_config c = {.message = &message, .trigger = &sm_trigger_a};
+    const hg_real value[2] = {R(1), R(20)};
+    arm_codes(codes, COUNT(codes));
+    assert_status(HG_OK, hg_sender_start(&self, &c, codes));
+    assert_status(HG_OK, hg_sender_step(&self, 0U, value, &frame));
+    assert_status(HG_OK, hg_frame_unpack(&message, &frame, code));
+    assert_int_equal(64, code[0]);
+    assert_int_equal(20, code[1]);
+    assert_codes_untouched(&codes[2U * 2U], 1U);
+}
+
 static void a_sender_stamps_counts_and_protects_what_it_sends(void **state)
 {
     (void)state;
@@ -1614,6 +1636,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sender_refuses_null_and_contradictions),
+        cmocka_unit_test(a_sender_sends_each_signal_by_its_own_scale),
         cmocka_unit_test(a_sender_stamps_counts_and_protects_what_it_sends),
         cmocka_unit_test(a_silent_sender_leaves_the_frame_and_its_counter_alone),
         cmocka_unit_test(what_cannot_be_sent_goes_out_as_invalid),

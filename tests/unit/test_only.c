@@ -144,6 +144,27 @@ static void another_order_is_refused(void **state)
     }
 }
 
+/* Nothing is gathered where the signals are read in their order: each must come in by its own column all the same. */
+static void a_residual_reads_the_signals_where_they_are(void **state)
+{
+    (void)state;
+    tables t;
+    begin(&t);
+    hg_residual self;
+    hg_real memory[64];
+    for (uint8_t g = 0U; g < HG_ONLY_READ; g++) {
+        hg_real value[HG_ONLY_READ] = {R(0)};
+        hg_real r[HG_ONLY_RESIDUALS];
+        value[g] = R(1);
+        arm(memory, COUNT(memory));
+        assert_status(HG_OK, hg_residual_start(&self, &t.residual, memory));
+        assert_status(HG_OK, hg_residual_step(&self, value, r));
+        for (uint8_t i = 0U; i < HG_ONLY_RESIDUALS; i++) {
+            assert_real(t.residual.direct.data[(HG_ONLY_READ * i) + g], r[i]);
+        }
+    }
+}
+
 static void a_plant_at_rest_raises_no_alarm_and_a_fault_does(void **state)
 {
     (void)state;
@@ -180,6 +201,7 @@ int main(void)
         cmocka_unit_test(a_ring_of_another_size_is_refused),
         cmocka_unit_test(another_count_is_refused_by_the_detector),
         cmocka_unit_test(another_order_is_refused),
+        cmocka_unit_test(a_residual_reads_the_signals_where_they_are),
         cmocka_unit_test(a_plant_at_rest_raises_no_alarm_and_a_fault_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

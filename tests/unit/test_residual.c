@@ -57,6 +57,21 @@ static void start_tells_null_and_bad_shapes(void **state)
     assert_true(hg_residual_valid(&usual));
 }
 
+/* No size may be 0, though the tables agree about it. */
+static void nothing_is_no_size(void **state)
+{
+    (void)state;
+    hg_residual_config c = usual;
+    c.order = c.state.rows = c.state.cols = c.input.rows = c.output.cols = 0U;
+    assert_false(hg_residual_valid(&c));
+    c = usual;
+    c.residuals = c.output.rows = c.direct.rows = 0U;
+    assert_false(hg_residual_valid(&c));
+    c = usual;
+    c.width = c.input.cols = c.direct.cols = 0U;
+    assert_false(hg_residual_valid(&c));
+}
+
 static void begin(hg_residual *self, hg_real memory[REALS + 1U])
 {
     arm(memory, REALS + 1U);
@@ -221,6 +236,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null_and_bad_shapes),
+        cmocka_unit_test(nothing_is_no_size),
         cmocka_unit_test(a_step_computes_by_hand),
         cmocka_unit_test(a_number_that_is_not_finite_changes_nothing),
         cmocka_unit_test(a_sum_that_overflows_never_enters_the_state),

@@ -27,6 +27,23 @@ static void a_ring_refuses_null_and_empty(void **state)
     assert_untouched(&memory[1], 1U);
 }
 
+/* Before the first row every sample is 0, in a ring of one row too. */
+static void a_new_ring_begins_at_its_first_row(void **state)
+{
+    (void)state;
+    for (uint8_t length = 1U; length <= LENGTH; length++) {
+        hg_ring ring;
+        hg_real memory[SIGNALS * LENGTH];
+        assert_status(HG_OK, hg_ring_start(&ring, SIGNALS, length, memory));
+        assert_true(hg_ring_row(&ring, 0U) == memory);
+        const hg_real row[SIGNALS] = {R(1), R(2), R(3)};
+        assert_status(HG_OK, hg_ring_push(&ring, row));
+        hg_ring_reset(&ring);
+        assert_true(hg_ring_row(&ring, 0U) == memory);
+        assert_real(0.0, memory[SIGNALS - 1U]);
+    }
+}
+
 static void the_largest_ring_wraps_within_its_memory(void **state)
 {
     (void)state;
@@ -159,6 +176,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ring_refuses_null_and_empty),
+        cmocka_unit_test(a_new_ring_begins_at_its_first_row),
         cmocka_unit_test(the_largest_ring_wraps_within_its_memory),
         cmocka_unit_test(a_number_that_is_not_finite_is_refused_at_every_place),
         cmocka_unit_test(rewriting_finds_the_right_sample_and_signals),

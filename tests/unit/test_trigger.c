@@ -51,6 +51,7 @@ static void tables_outside_their_ranges_are_refused(void **state)
     (void)state;
     const int32_t negative[LEVELS * WIDTH] = {10, 4, 5, 2, 1, -1};
     const uint8_t too_silent[LEVELS] = {3U, 1U, 6U};
+    const uint8_t too_silent_at_first[LEVELS] = {6U, 1U, 0U};
     hg_trigger_config c = usual;
     assert_true(hg_trigger_valid(&c));
     c.width = (uint8_t)(HG_GROUP_SIGNALS_MAX + 1U);
@@ -65,6 +66,8 @@ static void tables_outside_their_ranges_are_refused(void **state)
     refuse(&c);
     c = usual, c.silence = too_silent;
     refuse(&c);
+    c = usual, c.silence = too_silent_at_first;
+    refuse(&c);
     c = usual, c.delta = NULL;
     refuse(&c);
     c = usual, c.sigma = NULL;
@@ -75,6 +78,63 @@ static void tables_outside_their_ranges_are_refused(void **state)
     refuse(&c);
     c = usual, c.zero = NULL;
     refuse(&c);
+    for (uint8_t i = 0U; i < (LEVELS * WIDTH); i++) { /* each place of the table is looked at */
+        int32_t one_negative[LEVELS * WIDTH] = {0};
+        one_negative[i] = -1;
+        c = usual, c.sigma = one_negative;
+        refuse(&c);
+    }
+    c = usual, c.width = 1U, c.delta = NULL;
+    refuse(&c);
+}
+
+static void the_largest_tables_are_taken(void **state)
+{
+    (void)state;
+    static const uint16_t delta[HG_LEVELS_MAX * HG_GROUP_SIGNALS_MAX];
+    static const int32_t none[HG_LEVELS_MAX * HG_GROUP_SIGNALS_MAX];
+    static const uint8_t silence[HG_LEVELS_MAX];
+    const hg_trigger_config c = {.width = HG_GROUP_SIGNALS_MAX, .levels = HG_LEVELS_MAX, .interval_max = 1U, .silence = silence, .delta = delta, .sigma = none,
+        .activity = none, .zero = none};
+    assert_true(hg_trigger_valid(&c));
+}
+
+/* Whatever was in the memory: nothing sent, the first level, no age. */
+static void a_start_leaves_nothing_undefined(void **state)
+{
+    (void)state;
+    hg_trigger self;
+    int32_t codes[WIDTH + 1U];
+    (void)memset(&self, 0x5A, sizeof(self));
+    arm_codes(codes, COUNT(codes));
+    assert_status(HG_OK, hg_trigger_start(&self, &usual, codes));
+    assert_int_equal(0, self.level);
+    assert_int_equal(0, self.age);
+    assert_false(self.started);
+    assert_int_equal(HG_CODE_INVALID, codes[0]);
+    assert_int_equal(HG_CODE_INVALID, codes[1]);
+    assert_codes_untouched(&codes[WIDTH], 1U);
+}
+
+/* Each channel deviates by the threshold of what it has sent itself. */
+static void a_threshold_is_that_of_its_own_channel(void **state)
+{
+    (void)state;
+    const uint16_t half[WIDTH] = {32768U, 32768U};
+    const int32_t none[WIDTH] = {0, 0};
+    const uint8_t quiet[] = {0U};
+    const hg_trigger_config c = {.width = WIDTH, .levels = 1U, .interval_max = 200U, .silence = quiet, .delta = half, .sigma = none, .activity = none, .zero = none};
+    hg_trigger self;
+    int32_t codes[WIDTH];
+    for (int32_t own = 0; own < 2; own++) {
+        const int32_t sent[WIDTH] = {(own == 0) ? 1000 : 20, (own == 0) ? 20 : 1000};
+        const int32_t silent[WIDTH] = {(own == 0) ? 1500 : 20, (own == 0) ? 20 : 1500};
+        const int32_t far[WIDTH] = {(own == 0) ? 1000 : 31, (own == 0) ? 31 : 1000};
+        assert_status(HG_OK, hg_trigger_start(&self, &c, codes));
+        assert_status(HG_OK, hg_trigger_step(&self, sent));
+        assert_status(HG_E_EMPTY, hg_trigger_step(&self, silent));
+        assert_status(HG_OK, hg_trigger_step(&self, far));
+    }
 }
 
 static void the_threshold_is_absolute_plus_relative(void **state)
@@ -123,6 +183,10 @@ static void the_level_is_the_highest_activity_in_any_channel(void **state)
     const struct { int32_t a; int32_t b; uint8_t level; } cases[] = {
         {0, 0, 0U}, {19, 29, 0U}, {20, 0, 1U}, {-20, 0, 1U}, {0, 30, 1U}, {99, 199, 1U}, {100, 0, 2U}, {0, -200, 2U},
         {HG_CODE_INVALID, 0, 2U}, {0, HG_CODE_INVALID, 2U}};
+    const int32_t next_to_invalid[WIDTH] = {HG_CODE_INVALID + 1, 0};
+    const int32_t invalid[WIDTH] = {HG_CODE_INVALID, 0};
+    assert_int_equal(2, hg_trigger_level(&usual, invalid, next_to_invalid)); /* however near their codes are */
+    assert_int_equal(2, hg_trigger_level(&usual, next_to_invalid, invalid));
     for (size_t i = 0U; i < COUNT(cases); i++) {
         const int32_t sent[WIDTH] = {cases[i].a, cases[i].b};
         assert_int_equal(cases[i].level, hg_trigger_level(&usual, sent, previous));
@@ -290,6 +354,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_refuses_null),
         cmocka_unit_test(tables_outside_their_ranges_are_refused),
+        cmocka_unit_test(the_largest_tables_are_taken),
+        cmocka_unit_test(a_start_leaves_nothing_undefined),
+        cmocka_unit_test(a_threshold_is_that_of_its_own_channel),
         cmocka_unit_test(the_threshold_is_absolute_plus_relative),
         cmocka_unit_test(the_relative_part_counts_from_the_code_of_zero),
         cmocka_unit_test(the_threshold_saturates),

@@ -1,0 +1,257 @@
+#!/usr/bin/env python3
+"""Put faults into the library, one at a time, and see whether the unit tests notice: run.py FOLDER BUILD...
+
+FOLDER/BUILD holds the objects of the library and the test programs (mutation.mk). All mutants of a file are compiled at once (mutate.py); a test program is
+started once and forks for each (runtime.c). A mutant is killed when a program that comes by it fails, crashes or takes many times its usual time. What survives is
+an error unless equivalent.toml explains it, and so is an entry there that explains nothing.
+"""
+
+import argparse
+import json
+import os
+import random
+import re
+import shlex
+import subprocess
+import sys
+import time
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mutate import Mutant, Mutator
+
+HERE = Path("tests/mutation")
+TIMES = 4.0  # of a program's usual time that a mutant may take, and
+LEAST_S = 0.1  # that long anyway
+CAMPAIGNS = {"test_adversary", "test_robust", "test_e2e_errors"}  # seconds each: what they alone notice, no test of the module does
+SMALL = 120  # mutants of a file that every run makes all
+FILES = 4  # larger files that a sample is from
+Key = tuple[str, str, str, str, str]
+
+
+@dataclass
+class Verdicts:
+    """What became of the mutants of one file."""
+
+    mutants: dict[int, Mutant] = field(default_factory=dict)  # those that compile in some build and were asked for
+    killer: dict[int, str] = field(default_factory=dict)
+
+    @property
+    def survivors(self) -> list[Mutant]:
+        """Those that no test has noticed."""
+        return [mutant for number, mutant in sorted(self.mutants.items()) if number not in self.killer]
+
+
+@dataclass(frozen=True)
+class Program:
+    """A test program of one build, with the library that has the mutants of one file."""
+
+    path: Path
+    library: Path
+    folder: Path
+
+    def run(self, **more: str) -> float:
+        """Run it; processor seconds. It must not fail."""
+        environment = {**os.environ, "LD_LIBRARY_PATH": str(self.library.parent.resolve()), "CMOCKA_TEST_ABORT": "1", **more}
+        before = time.perf_counter()
+        done = subprocess.run([self.path.resolve()], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False, cwd=".")
+        if done.returncode != 0:
+            raise RuntimeError(f"{self.path} fails without a mutant in {self.library}: {done.stderr.decode()[-500:]}")
+        return time.perf_counter() - before
+
+    def reached(self) -> tuple[set[int], float]:
+        """The mutants that it comes by, and its time."""
+        out = self.folder / f"{self.path.name}.reached"
+        seconds = self.run(HG_REACHED=str(out))
+        return {int(line) for line in out.read_text().split()}, seconds
+
+    def killed(self, numbers: set[int], seconds: float) -> set[int]:
+        """Those of the mutants that it notices."""
+        asked, told = self.folder / f"{self.path.name}.asked", self.folder / f"{self.path.name}.told"
+        asked.write_text("".join(f"{number}\n" for number in sorted(numbers)))
+        self.run(HG_MUTANTS=str(asked), HG_VERDICTS=str(told), HG_LIMIT_US=str(int(1e6 * (LEAST_S + TIMES * seconds))))
+        verdicts = dict(line.split() for line in told.read_text().splitlines())
+        if len(verdicts) != len(numbers):
+            raise RuntimeError(f"{self.path} answers for {len(verdicts)} of {len(numbers)} mutants")
+        return {int(number) for number, verdict in verdicts.items() if verdict == "k"}
+
+
+class Builder:
+    """Makes libraries with mutants."""
+
+    def __init__(self, folder: Path, builds: list[str]) -> None:
+        self.folder = folder
+        self.builds = builds
+        self.flags = {build: shlex.split((folder / build / "flags").read_text()) for build in builds}
+
+    def library(self, source: Path, build: str) -> tuple[Path, Mutator, frozenset[int]]:
+        """The library of a build with all mutants of one file, and which of them do not compile in it."""
+        place = self.folder / build / "mutants" / source.stem
+        place.mkdir(parents=True, exist_ok=True)
+        left_out: frozenset[int] = frozenset()
+        while True:
+            mutator = Mutator(source.stem, source.read_text(), left_out)
+            (place / source.name).write_text(mutator.write())
+            bad = self.compile(place / source.name, build, "-fsyntax-only")
+            if not bad:
+                self.compile(place / source.name, build, "-c")
+                break
+            if bad <= left_out:
+                raise RuntimeError(f"{place / source.name} does not compile without its mutants either")
+            left_out |= bad
+        others = [path for path in (self.folder / build / "firmware/src").glob("*.o") if path.stem != source.stem]
+        runtime = self.folder / build / "tests/mutation/runtime.o"
+        subprocess.run(["clang-19", "-shared", "-Wl,-Bsymbolic,-soname,libhg.so", "-o", place / "libhg.so", place / f"{source.stem}.o", *others, runtime], check=True)
+        return place / "libhg.so", mutator, left_out
+
+    def compiled(self, source: Path, build: str) -> set[int]:
+        """Numbers of the mutants that the preprocessor leaves in a build."""
+        text = subprocess.run([*self.flags[build], "-E", "-P", "-include", str(HERE / "runtime.h"), str(source)], capture_output=True, encoding="utf-8", check=True).stdout
+        return {int(number) for number in re.findall(r"hg_is_mutant\((\d+)U\)", text)}
+
+    def compile(self, source: Path, build: str, what: str) -> set[int]:
+        """Numbers of the mutants that the compiler refuses."""
+        command = [*self.flags[build], "-ferror-limit=0", "-include", str(HERE / "runtime.h"), what, str(source), "-o", str(source.with_suffix(".o"))]
+        done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
+        if done.returncode == 0:
+            return set()
+        lines = source.read_text().splitlines()
+        wrong = {int(number) for number in re.findall(rf"^{re.escape(str(source))}:(\d+):\d+: error", done.stderr, re.MULTILINE)}
+        # A message about an operator stands where that is: its operand follows.
+        numbers = {number for line in wrong if (number := next((int(m[1]) for text in lines[line - 1 :] if (m := re.search(r"hg_is_mutant\((\d+)U\)", text))), 0))}
+        if not numbers:
+            raise RuntimeError(done.stderr[:2000])
+        return numbers
+
+
+def programs_of(folder: Path, module: str) -> list[Path]:
+    """The test programs of a build; those that are named after the module first."""
+    programs = [path for path in folder.glob("test_*") if os.access(path, os.X_OK) and not path.suffix and path.name not in CAMPAIGNS]
+    return sorted(programs, key=lambda path: (not path.name.startswith(f"test_{module}"), path.name))
+
+
+def judge(builder: Builder, source: Path, chosen: set[Key] | None) -> Verdicts:
+    """Run the mutants of a file: all, or those that are chosen."""
+    verdicts = Verdicts()
+    for build in builder.builds:
+        library, mutator, left_out = builder.library(source, build)
+        there = builder.compiled(library.parent / source.name, build) - left_out
+        numbers = {mutant.number: mutant for mutant in mutator.mutants if mutant.number in there and (chosen is None or mutant.key in chosen)}
+        verdicts.mutants |= numbers
+        for path in programs_of(builder.folder / build, source.stem):
+            alive = {number for number in numbers if number not in verdicts.killer}
+            if not alive:
+                break
+            program = Program(path, library, library.parent)
+            reached, seconds = program.reached()
+            if alive & reached:
+                killed = program.killed(alive & reached, seconds)
+                verdicts.killer |= {number: f"{build}/{path.name}" for number in killed}
+    return verdicts
+
+
+def drawn(sources: list[Path], pending: dict[str, int], count: int, seed: int) -> dict[Path, set[Key] | None]:
+    """All mutants of the small files, and so many of the others, of a few files each time; files that are pending have nothing to show by a sample."""
+    random_ = random.Random(seed)
+    mutants = {path: mutants_of(path) for path in sources if path.stem not in pending}
+    chosen: dict[Path, set[Key] | None] = {path: None for path, found in mutants.items() if len(found) <= SMALL}
+    large = sorted(path for path in mutants if path not in chosen)
+    files = random_.sample(large, min(FILES, len(large)))
+    for path in files:
+        chosen[path] = {mutant.key for mutant in random_.sample(mutants[path], min(len(mutants[path]), count // len(files)))}
+    return chosen
+
+
+def mutants_of(source: Path) -> list[Mutant]:
+    """Every mutant of a file, whether it compiles or not."""
+    mutator = Mutator(source.stem, source.read_text(encoding="utf-8"))
+    mutator.write()
+    return mutator.mutants
+
+
+@dataclass
+class Table:
+    """equivalent.toml: survivors with their reasons, and files whose survivors nobody has looked at yet."""
+
+    reasons: dict[Key, str]
+    pending: dict[str, int]
+
+    @classmethod
+    def read(cls, path: Path) -> "Table":
+        """Read the table; an entry has module, function, operator, original, mutated and why."""
+        text = tomllib.loads(path.read_text(encoding="utf-8"))
+        names = ("module", "function", "operator", "original", "mutated")
+        reasons: dict[Key, str] = {}
+        for entry in text.get("equivalent", []):
+            module, function, operator, original, mutated = (entry[name] for name in names)
+            reasons[(module, function, operator, original, mutated)] = entry["why"]
+        return cls(reasons, dict(text.get("pending", {})))
+
+
+def faults_of(module: str, verdicts: Verdicts, table: Table, whole: bool) -> list[str]:
+    """Unexplained survivors of a file, and what the table says that is not so."""
+    survivors = {mutant.key: mutant for mutant in verdicts.survivors}
+    unexplained = [mutant for key, mutant in survivors.items() if key not in table.reasons]
+    faults = []
+    if module in table.pending:
+        if len(unexplained) > table.pending[module]:
+            faults.append(f"{module}: {len(unexplained)} unexplained survivors, pending says {table.pending[module]}")
+        elif whole and len(unexplained) < table.pending[module]:
+            faults.append(f"{module}: {len(unexplained)} unexplained survivors, fewer than the {table.pending[module]} that pending says: take the number down")
+    else:
+        faults += [f"firmware/src/{module}.c:{m.line}: {m.operator} in {m.function}() survives\n    - {m.original}\n    + {m.mutated}" for m in unexplained]
+    seen = {mutant.key for mutant in verdicts.mutants.values()}
+    for key in table.reasons:
+        if key[0] == module and key in seen and key not in survivors:
+            faults.append(f"equivalent.toml: a test kills {key}")
+        elif key[0] == module and whole and key not in seen:
+            faults.append(f"equivalent.toml: there is no mutant {key}")
+    return faults
+
+
+def main() -> int:
+    """Judge the files, keep the verdicts, say what survives."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("builds", nargs="+")
+    parser.add_argument("--results", type=Path, help="write what holds to this file")
+    parser.add_argument("--sample", type=int, help="so many mutants of the larger files, drawn by HULLGUARD_SEED; all of the small ones")
+    parser.add_argument("--module", action="append", help="only this file")
+    arguments = parser.parse_args()
+    builder = Builder(arguments.folder, arguments.builds)
+    table = Table.read(HERE / "equivalent.toml")
+    sources = [path for path in sorted(Path("firmware/src").glob("*.c")) if not arguments.module or path.stem in arguments.module]
+    chosen: dict[Path, set[Key] | None] = dict.fromkeys(sources)
+    if arguments.sample:
+        seed = int(os.environ.get("HULLGUARD_SEED", "0")) or int.from_bytes(os.urandom(4))
+        print(f"HULLGUARD_SEED={seed}")
+        chosen = drawn(sources, table.pending, arguments.sample, seed)
+    faults = [f"equivalent.toml: there is no firmware/src/{key[0]}.c" for key in table.reasons if not Path(f"firmware/src/{key[0]}.c").exists()]
+    made = survived = 0
+    for source, keys in sorted(chosen.items()):
+        verdicts = judge(builder, source, keys)
+        found = faults_of(source.stem, verdicts, table, keys is None)
+        print(f"{source.stem}: {len(verdicts.mutants)} mutants, {len(verdicts.survivors)} survive, {len(found)} faults", flush=True)
+        faults += found
+        made, survived = made + len(verdicts.mutants), survived + len(verdicts.survivors)
+    for fault in faults:
+        print(fault, file=sys.stderr)
+    if not faults and arguments.results:
+        write_results(arguments.results, made, survived, sorted(path.stem for path in chosen), table)
+    return 1 if faults else 0
+
+
+def write_results(path: Path, made: int, survived: int, modules: list[str], table: Table) -> None:
+    """What holds, for the page of promises."""
+    complete = [module for module in modules if module not in table.pending]
+    promise = "a fault put into the library is noticed by a unit test, or explained as no fault, in all files but those named as pending"
+    pending = ", ".join(f"{module} {count}" for module, count in sorted(table.pending.items())) or "none"
+    result = f"{made} faults in {len(modules)} files, {len(complete)} of them complete; {survived} survive, each explained or in a pending file (unexplained: {pending})"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    gate = {"gate": path.stem, "command": f"make {path.stem}", "promises": [{"promise": promise, "result": result}]}
+    path.write_text(json.dumps(gate, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
