@@ -14,6 +14,15 @@ from hullguard.errors import HullguardError
 STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad input; 3 the bus cannot be opened; 130 Ctrl-C (0 where that ends it: detect, monitor, inject)
 """
 
+FREEZE = """a model may have its ECU keep the samples around a confirmed alarm, to be read with `hullguard freeze`:
+  [freeze]
+  samples = 16                 kept, 1 .. 255; 0 (default): none. RAM of a sample: 16 to 20 bytes, and 2 numbers a signal and residual
+  after = 4                    of them after the alarm's, 0 .. samples - 1 (default: a quarter)
+  frames_per_sample = 4        that an answer may send at most, 1 .. 255
+  request = { id = 0x140 }     a frame of the detector's own, classic CAN, 8 bytes
+  response = { id = 0x141 }    the same (default: the next identifier)
+"""
+
 EPILOG = f"""a fault SPEC is NAME:KIND[:SIZE]@START[..END], for example gap12_m:bias:0.5@100:
   NAME a signal or a fault of the model; KIND bias, drift (units a second), gain, freeze or noise; START and END sample indices
 
@@ -108,6 +117,7 @@ def build_parser() -> argparse.ArgumentParser:
         return commands.add_parser(name, help=text, description=text, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)
 
     p = add("design", "check a model, find its detector, and write C tables, DBC and design report")
+    p.epilog = f"{FREEZE}\n{STATUS}"
     _common(p)
     p.add_argument("--out", metavar="DIR", help="folder for tables, DBC and report (default build/NAME)")
     p.add_argument("--fresh", action="store_true", help="search again even if NAME.design.toml fits the model")
@@ -154,6 +164,12 @@ def build_parser() -> argparse.ArgumentParser:
     p.add_argument("--lockstep", action="store_true", help="the bus keeps no time: no deadline for the closing frame")
     p.add_argument("--samples", type=_positive, metavar="N", help="stop after N samples")
     p.add_argument("--snapshot", action="append", default=[], metavar="FILE", help="the last screen as FILE.svg or FILE.txt; may be given more than once")
+    _bus(p)
+
+    p = add("freeze", "what an ECU knew in the samples around a confirmed alarm: read over the bus, shown as a table, and cleared")
+    _common(p)
+    p.add_argument("--csv", metavar="FILE", help="write all numbers there, a row a sample")
+    p.add_argument("--clear", action="store_true", help="once it is read, let the ECU record again")
     _bus(p)
 
     p = add("plant", "the emulated plant and its senders alone, on a bus with a node of your own")
@@ -234,6 +250,7 @@ def build_parser() -> argparse.ArgumentParser:
 def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
     from hullguard import commands
     from hullguard.codegen.amalgam import run_amalgam
+    from hullguard.freeze.command import run_freeze
     from hullguard.identify.command import run_identify
     from hullguard.inject.command import run_inject
     from hullguard.monitor.command import run_monitor
@@ -246,6 +263,7 @@ def _commands() -> dict[str, Callable[[argparse.Namespace], int]]:
         "detect": commands.run_detect,
         "plant": commands.run_plant,
         "monitor": run_monitor,
+        "freeze": run_freeze,
         "campaign": commands.run_campaign,
         "limit": commands.run_limit,
         "new": run_new,

@@ -283,12 +283,13 @@ def _drive(
         say(args, f"bus: {name}")
         log = candump.Writer(out / "run.log", name.split()[0] if not isinstance(bus, InProcess) else "vcan0") if out else None
         try:
-            trace, mismatch = _loop(args, made, source, samples, Run(made, native, bus, pace, log, start))
+            run = Run(made, native, bus, pace, log, start)
+            trace = _loop(args, made, source, samples, run)
         finally:
             if log is not None:
                 log.close()
     facts = {"bus": name, "seed": args.seed, "scenario": scenario} | (more or {})
-    result = summary(made, native, trace, faults, facts)
+    result = summary(made, native, trace, faults, facts) | ({} if isinstance(bus, InProcess) else run.told.facts())
     found = estimated(made, native.library, trace, start, source.emulated if isinstance(source, Continuous) else None)
     result |= estimate_facts(found) if found else {}
     filters = filtered(made, native.library, trace, source.states if isinstance(source, Followed) else None)
@@ -306,9 +307,16 @@ def _drive(
             _finish(args, out)
     _tell(args, result)
     emit(args, result)
-    if mismatch:
-        raise ExpectationError(f"the node's verdicts differ from this process's: {mismatch}")
+    _agreed(run)
     return _expected(args, result)
+
+
+def _agreed(run: Run) -> None:
+    """Refuse a run with a node of another model, or with other verdicts than this process's."""
+    if run.told.complaint is not None:
+        raise ExpectationError(run.told.complaint)
+    if run.mismatch:
+        raise ExpectationError(f"the node's verdicts differ from this process's: {run.mismatch}")
 
 
 def _drive_inside(args: argparse.Namespace) -> int:
@@ -334,11 +342,11 @@ def _report(args: argparse.Namespace, out: Path) -> None:
     say(args, f"report: {write_run_report(out)}")
 
 
-def _loop(args: argparse.Namespace, made: Design, source: Source, samples: int, run: Run) -> tuple[Trace, str | None]:
+def _loop(args: argparse.Namespace, made: Design, source: Source, samples: int, run: Run) -> Trace:
     from hullguard.report.live import LiveTable
 
     if args.json or args.quiet:
-        return run.samples(source, samples), run.mismatch
+        return run.samples(source, samples)
     with LiveTable(made, samples) as table:
 
         def watch(k: int, trace: Trace) -> None:
@@ -347,7 +355,7 @@ def _loop(args: argparse.Namespace, made: Design, source: Source, samples: int, 
             bus = dict(zip((g.name for g in made.tables.groups), v.bus, strict=True))
             table.update(k, trace.value[-1], trace.radius[-1], ratios, v.plant, bus, trace.counts["measurement"], candidate_names(made, v.candidates))
 
-        return run.samples(source, samples, watch), run.mismatch
+        return run.samples(source, samples, watch)
 
 
 def bus_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -498,11 +506,10 @@ def run_plant(args: argparse.Namespace) -> int:
     with opened(**options) as link:
         run = Run(made, native, OnCan(link, native, pace), pace, start=MOVING if args.moving else REST)
         trace = run.samples(source, samples)
-    result = summary(made, native, trace, faults, {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name})
+    result = summary(made, native, trace, faults, {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name}) | run.told.facts()
     _tell(args, result)
     emit(args, result)
-    if run.mismatch:
-        raise ExpectationError(f"the node's verdicts differ from this process's: {run.mismatch}")
+    _agreed(run)
     return 0
 
 
@@ -552,7 +559,12 @@ def run_detect(args: argparse.Namespace) -> int:
             from_bus(detector, link, made.model.sample_time_s, not args.lockstep, args.samples or 0, stopped)
     health = detector.node.health()
     say(args, f"{detector.samples} samples; " + ", ".join(f"{n} {c}" for n, c in health.items() if c))
-    emit(args, {"model": made.model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "samples": detector.samples, "communication": health, "verdicts": changes})
+    emit(args, {
+        "model": made.model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "samples": detector.samples, "communication": health, "verdicts": changes,
+        **detector.told.facts(),
+    })  # fmt: skip
+    if detector.told.complaint is not None:
+        raise ExpectationError(detector.told.complaint)
     alarms = [c for c in changes if c["plant"] in ALARMS]
     if args.expect == "quiet" and alarms:
         raise ExpectationError(f"expected quiet, but there was an alarm at sample {alarms[0]['k']}")

@@ -32,6 +32,7 @@ from hullguard.model.schema import parse_override
 from hullguard.model.table import Array
 from hullguard.plant import fusion as plant
 from hullguard.plant.detect import Detector, from_bus, from_log
+from hullguard.plant.told import ToldModel
 
 FAULTS_MAX = 16
 
@@ -166,6 +167,7 @@ def _drive(args: argparse.Namespace, made: FusionDesign, drive: Array, scenario:
     facts = {"bus": bus_name, "seed": args.seed, "scenario": name, "loss": scenario.loss, "late": scenario.late}
     result = plant.summary(made, native, trace, faults, facts)
     result["copies"]["node_digest"] = told.get("state.digest")
+    result |= {} if isinstance(bus, plant.InProcess) else run.told.facts()
     if out is not None:
         plant.write_files(out, made, trace, faults, result)
         (out / f"{made.model.name}.dbc").write_text(emit_dbc(made), encoding="utf-8")
@@ -178,6 +180,8 @@ def _drive(args: argparse.Namespace, made: FusionDesign, drive: Array, scenario:
 
 def _judged(args: argparse.Namespace, result: dict[str, Any], run: plant.Run) -> int:
     """Nodes that differ, and --expect."""
+    if run.told.complaint is not None:
+        raise ExpectationError(run.told.complaint)
     if run.mismatch:
         raise ExpectationError(f"the node's frames differ from this process's: {run.mismatch}")
     copies = result["copies"]
@@ -297,7 +301,10 @@ def run_plant(args: argparse.Namespace) -> int:
     facts = {"bus": str(options.get("channel")), "seed": args.seed, "scenario": scenario.name, "loss": scenario.loss, "late": scenario.late}
     result = plant.summary(made, native, trace, faults, facts)
     _tell(args, result)
+    result |= run.told.facts()
     emit(args, result)
+    if run.told.complaint is not None:
+        raise ExpectationError(run.told.complaint)
     if run.mismatch:
         raise ExpectationError(f"the node's frames differ from this process's: {run.mismatch}")
     return 0
@@ -311,6 +318,7 @@ class FusionDetector(Detector):
 
     def __init__(self, native: TrackerNative, start: int, lockstep: bool, send: Any, watch: Callable[[Verdict], None], period_s: float | None) -> None:
         self.tracker = Tracker(native, start)
+        self.told = ToldModel(native.library, native.tables.name, native.tables.hash, native.config.status, native.tables.status)
         super().begin(self.tracker, native.tables.tick.id, lockstep, send, watch, period_s)
 
 
@@ -344,8 +352,10 @@ def run_detect(args: argparse.Namespace) -> int:
     say(args, f"{detector.samples} samples, digest {detector.tracker.digest:08x}; " + ", ".join(f"{n} {v:.4g}" for n, v in estimate.items()))
     emit(args, {
         "model": made.model.name, "model_hash": f"{made.tables.hash:08x}", "real": args.real, "samples": detector.samples,
-        "digest": f"{detector.tracker.digest:08x}", "estimate": estimate, "communication": health, "verdicts": changes,
+        "digest": f"{detector.tracker.digest:08x}", "estimate": estimate, "communication": health, "verdicts": changes, **detector.told.facts(),
     })  # fmt: skip
+    if detector.told.complaint is not None:
+        raise ExpectationError(detector.told.complaint)
     alarms = [c for c in changes if c["candidates"]]
     if args.expect == "quiet" and alarms:
         raise ExpectationError(f"expected quiet, but a sensor was suspected at sample {alarms[0]['k']}")
@@ -381,6 +391,7 @@ def report(args: argparse.Namespace, directory: Path) -> int | None:
 
 COMMANDS = {"design": run_design, "run": run_run, "replay": run_replay, "detect": run_detect, "plant": run_plant}
 INSTEAD = {
+    "freeze": "its filter has no residuals to keep; run --out writes what every sample showed",
     "monitor": "hullguard detect MODEL prints its verdicts, and the DBC of hullguard design shows its frames in any CAN tool",
     "campaign": "make fusion-study judges it over thousands of runs, and run --out puts its figures into the report",
     "limit": "a limit is that of bounds, and this filter has probabilities; see make fusion-study",

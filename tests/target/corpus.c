@@ -312,12 +312,12 @@ static bool tested(const subject *of)
     while (status == HG_E_BUSY) {
         status = of->check(&walk, NUMBERS);
     }
-    const hg_status drive = of->selftest();
+    const hg_status passed = of->selftest();
     print(of->name);
     print_hex(" digest ", walk.crc, 8U);
     print((status == HG_OK) ? " good" : " wrong");
-    print((drive == HG_OK) ? " self-test passed\n" : " self-test failed\n");
-    return (status == HG_OK) && (drive == HG_OK);
+    print((passed == HG_OK) ? " self-test passed\n" : " self-test failed\n");
+    return (status == HG_OK) && (passed == HG_OK);
 }
 
 static bool run(const subject *of)

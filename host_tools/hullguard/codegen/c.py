@@ -707,7 +707,8 @@ def _node(design: Design) -> list[str]:
         lines += _protection(m.protection, n)
         body = _message(m, n, 0, "")
         body[0] = f"static const hg_message {n} = {body[0]}"
-        lines += [f"/* {n}: the detector's own frame; its byte map stands in {'freeze' if n.startswith('freeze') else 'frame'}.h */", body[0], "   " + body[1].removesuffix(",") + ";", ""]
+        header = "freeze" if n.startswith("freeze") else "frame"
+        lines += [f"/* {n}: the detector's own frame; its byte map stands in {header}.h */", body[0], "   " + body[1].removesuffix(",") + ";", ""]
     lines += [
         *freeze_config(tables.freeze),
         f"const hg_node_config {t}_config = {{",

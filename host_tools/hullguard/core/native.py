@@ -308,6 +308,13 @@ class Node:
         count = self._lib.hg_node_report(self.node, self._verdict, lockstep and self.node.due == 0, self._frames)
         return [frame_out(self.native.library, self._frames[i]) for i in range(count)]
 
+    def answers(self) -> list[Frame]:
+        """Frames that answer requests for the freeze frame."""
+        found = []
+        while self._lib.hg_node_freeze(self.node, self._frames) == self._lib.HG_OK:
+            found.append(frame_out(self.native.library, self._frames[0]))
+        return found
+
     def _numbers(self, pointer: Any, count: int, first: int = 0) -> list[float]:
         return [x * self.native.unit(first + i) for i, x in enumerate(self._ffi.unpack(pointer, count))] if count else []
 

@@ -186,6 +186,10 @@ class Tracker:
                 found.append(frame_out(self.native.library, self._frames[0]))
         return found
 
+    def answers(self) -> list[Frame]:
+        """A fusion filter keeps no freeze frame."""
+        return []
+
     @property
     def value(self) -> list[float]:
         """Estimate of the sample closed last, absolute."""

@@ -33,12 +33,12 @@ from hullguard.design.tables import (
     ModalGeneratorTable,
     PredictTable,
     Tables,
+    check_freeze,
+    freeze_table,
     group_table,
     message_table,
     rows,
     verdict_table,
-    check_freeze,
-    freeze_table,
 )
 from hullguard.design.uio_generator import UioDesign
 from hullguard.design.uio_hull import ModalTables

@@ -414,7 +414,10 @@ def verdict_table(model: Model) -> MessageTable:
 def freeze_table(model: Model) -> FreezeTable | None:
     """hg_freeze_config, where the model keeps samples around an alarm."""
     f = model.freeze
-    return None if f is None else FreezeTable(f.samples, f.after, f.burst, message_table("freeze_request", f.request, CLASSIC_MAX), message_table("freeze_response", f.response, CLASSIC_MAX))
+    if f is None:
+        return None
+    request, response = message_table("freeze_request", f.request, CLASSIC_MAX), message_table("freeze_response", f.response, CLASSIC_MAX)
+    return FreezeTable(f.samples, f.after, f.burst, request, response)
 
 
 def check_freeze(tables: Tables) -> None:

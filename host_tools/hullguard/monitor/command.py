@@ -18,7 +18,7 @@ from hullguard.commands import bus_options, make_speed, prepared, signalled
 from hullguard.core.library import library
 from hullguard.core.native import MOVING, REST, Native
 from hullguard.design.design import Design
-from hullguard.errors import HullguardError, InputError
+from hullguard.errors import ExpectationError, HullguardError, InputError
 from hullguard.monitor.feed import Beat, watch_bus, watch_log
 from hullguard.monitor.plain import Lines
 from hullguard.monitor.snapshot import Snapshot
@@ -43,6 +43,8 @@ def run_monitor(args: argparse.Namespace) -> int:
         from hullguard.monitor.picture import write
 
         write(path, last, "END OF LOG" if last.ended else "LIVE")
+    if monitor.ecu.complaint is not None:
+        raise ExpectationError(monitor.ecu.complaint)
     return 0
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hullguard.core.native import Frame, Native, Verdict, frame_in, read_verdict
+from hullguard.core.native import Frame, Native, Verdict, read_verdict
 from hullguard.design.design import Design
 from hullguard.monitor.snapshot import EcuSeen, VerdictSeen
 from hullguard.plant.run import candidate_names
+from hullguard.plant.told import another, read_status
 
 SILENT_HEARTBEATS = 3  # a node that has said nothing for so many is silent
 STAMPS = 16  # a monitor that began later counts samples from another one, but alike modulo 16
@@ -69,20 +70,24 @@ class EcuWatch:
         self._time_s = time_s
 
     def _status(self, frame: Frame, time_s: float) -> None:
-        """CRC, stamp and counter, model hash, frames lost, frames refused (frame.h). Its protection is a verdict frame's, so that one check reads both."""
-        library = self._native.library
-        verdict, reply = library.ffi.new("hg_verdict *"), library.ffi.new("bool *")
-        if library.lib.hg_verdict_read(self._native.node.status, frame_in(library, frame), verdict, reply) != library.lib.HG_OK:
+        """Model hash, frames lost, frames refused."""
+        told = read_status(self._native.library, self._native.node.status, frame)
+        if told is None:
             self.damaged += 1
             return
         self._heard(time_s)
         self._status_s = time_s
-        self.hash, self._lost, self._refused = int.from_bytes(frame.data[2:6], "little"), frame.data[6], frame.data[7]
+        self.hash, self._lost, self._refused = told
 
     @property
     def model(self) -> str:
         """Whether it runs this model."""
         return "unknown" if self.hash is None else "match" if self.hash == self.expected else "other"
+
+    @property
+    def complaint(self) -> str | None:
+        """A line for whoever has to do something about a node of another model."""
+        return another(self._design.model.name, self.hash, self.expected)
 
     def state(self, now_s: float) -> str:
         """Whether it speaks."""

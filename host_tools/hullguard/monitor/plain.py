@@ -45,6 +45,7 @@ def fields(s: Snapshot) -> dict[str, object]:
         "ecu_bus": told.bus if told else {},
         "ecu_heartbeat_s": ecu.heartbeat_s,
         "ecu_model": ecu.model,
+        "ecu_hash": ecu.hash,
         "ecu_agrees": {True: "yes", False: "no", None: None}[ecu.agrees],
         "ecu_lost": ecu.lost,
         "ecu_refused": ecu.refused,

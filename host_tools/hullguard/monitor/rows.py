@@ -98,7 +98,7 @@ def head(s: Snapshot, mode: str, width: int = WIDTH) -> list[Row]:
     clock = f"{s.elapsed_s:.1f} s  {mode} "
     return [
         Row((left(where, width - len(clock)), Cell(clock)), "bold"),
-        _ecu_row(s.ecu, width),
+        _ecu_row(s.ecu, s.model_hash, width),
         _monitor_row(s, width),
         *_may_be_rows(s, width),
         *_bus_rows(s, width),
@@ -110,7 +110,7 @@ def _says(plant: str) -> str:
     return text.upper() if plant in ALARMED else text
 
 
-def _ecu_row(ecu: EcuSeen, width: int) -> Row:
+def _ecu_row(ecu: EcuSeen, expected: str, width: int) -> Row:
     def row(state: str, more: str, style: str) -> Row:
         return Row((Cell(" ECU      "), left(state, 20), left(more, width - 30)), style)
 
@@ -118,7 +118,7 @@ def _ecu_row(ecu: EcuSeen, width: int) -> Row:
         return row("not heard", "no verdict or status frame has come", DIM)
     said = _says(ecu.verdict.plant) if ecu.verdict else "no verdict yet"
     if ecu.model == "other":
-        return row(said, f"RUNS ANOTHER MODEL, {ecu.hash}", BUS_BAD)
+        return row(said, f"RUNS ANOTHER MODEL, {ecu.hash} instead of {expected}", BUS_BAD)
     if ecu.state == "silent":
         return row("SILENT", f"for {seconds(ecu.age_s)} s; said last: {said}", BUS_BAD)
     k = f"k {ecu.verdict.k}, " if ecu.verdict else ""

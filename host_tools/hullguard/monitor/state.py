@@ -47,6 +47,7 @@ class Monitor(Detector):
         self.groups = [GroupWatch(g) for g in tables.groups]
         self._place = {(g.message.id, g.message.flags & EXTENDED): i for i, g in enumerate(tables.groups)}
         self._own = {(m.id, m.flags & EXTENDED) for m in (tables.verdict, tables.status)}
+        self._reading = {(m.id, m.flags & EXTENDED) for m in (tables.freeze.request, tables.freeze.response)} if tables.freeze else set()
         self._bound = load_bound(tables, model.bitrate_bps, model.sample_time_s, model.data_bitrate_bps)
         self._judges = judges(design)
         self._names, self._columns = residual_names(self._judges), residual_columns(self._judges)
@@ -107,7 +108,8 @@ class Monitor(Detector):
         if key in self._place:
             self.groups[self._place[key]].frame(self.time_s)
             return True
-        self._unknown(frame)
+        if key not in self._reading:
+            self._unknown(frame)
         return False
 
     def _unknown(self, frame: Frame) -> None:
@@ -122,7 +124,7 @@ class Monitor(Detector):
             self._reply_bits += bits if told.reply else 0
             self._say("ecu", self.ecu.verdict)
         if self.ecu.hash is not None:
-            self._say("model", "the ECU runs this model" if self.ecu.model == "match" else f"the ECU runs another model, {self.ecu.hash:08x}")
+            self._say("model", "the ECU runs this model" if self.ecu.model == "match" else f"the ECU runs another model, {self.ecu.hash:08x} instead of {self.ecu.expected:08x}")
 
     def take(self, frame: Frame, time_s: float) -> int:
         """A frame that concerns the detector: booked, and its group's intervals and losses with it."""

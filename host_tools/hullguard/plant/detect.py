@@ -9,6 +9,7 @@ from typing import Any
 from hullguard.bus import candump
 from hullguard.bus.link import CanLink
 from hullguard.core.native import Frame, Native, Node, Verdict
+from hullguard.plant.told import ToldModel
 
 OK = 1  # hg_status
 
@@ -25,6 +26,7 @@ class Detector:
     node: Node
 
     def __init__(self, native: Native, start: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None = None) -> None:
+        self.told = ToldModel(native.library, native.tables.name, native.tables.hash, native.node.status, native.tables.status)
         self.begin(Node(native, start), native.tables.groups[native.tables.closing].message.id, lockstep, send, watch, period_s)
 
     def begin(self, node: Any, closing: int, lockstep: bool, send: Callable[[Frame], None] | None, watch: Callable[[Verdict], None], period_s: float | None) -> None:
@@ -44,6 +46,7 @@ class Detector:
             if missed > STAMPS:
                 self.node.outage()
                 self.outages += 1
+        self.told.take(frame)
         status = self.node.receive(frame)
         self.steps()
         if closing and status == OK:
@@ -64,6 +67,9 @@ class Detector:
             for frame in self.node.report(self._lockstep):
                 if self._send is not None:
                     self._send(frame)
+        for frame in self.node.answers():
+            if self._send is not None:
+                self._send(frame)
 
 
 def from_log(detector: Detector, entries: Iterable[candump.Entry], samples: int) -> None:

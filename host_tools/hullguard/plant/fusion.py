@@ -27,6 +27,7 @@ from hullguard.model.faults import FaultSpec
 from hullguard.model.fusion import DEAD, FusionModel, FusionScenario
 from hullguard.model.table import Array
 from hullguard.plant.recording import read_columns
+from hullguard.plant.told import ToldModel
 
 ANSWER_TIMEOUT_S = 10.0
 RECORDED = ("speed1_mps", "speed2_mps", "gap2_m")  # columns of a recording of two cars
@@ -254,6 +255,7 @@ class Run:
         self.senders = [FusionSender(copy, i) for i, copy in enumerate(self.copies)]
         self.plain, self.tick, self.trace = Plain(native, start), Tick(native), Trace()
         self.mismatch: str | None = None
+        self.told = ToldModel(native.library, made.model.name, native.tables.hash, native.config.status, native.tables.status)
         self._waiting: list[tuple[int, Frame]] = []
 
     def samples(self, drive: Array, sensors: Sensors, count: int, watch: Callable[[int, Trace], None] | None = None) -> Trace:
@@ -362,6 +364,7 @@ class Run:
         return said[0]
 
     def _hear(self, k: int, frame: Frame) -> None:
+        self.told.take(frame)
         verdict = self.native.read_verdict(frame)
         if verdict is not None and not self.lockstep:
             self.trace.heard.append(replace(verdict, k=k - (k - verdict.k) % 4096))
@@ -373,9 +376,6 @@ class Run:
     def _difference(self, k: int, got: list[Frame], expected: list[Frame]) -> str:
         """Why a node's frames are not the ones that this process would have sent."""
         for theirs, ours in zip(got, expected, strict=False):
-            if theirs != ours and theirs.id == ours.id == self.native.tables.status.id and theirs.data[2:6] != ours.data[2:6]:
-                found = [int.from_bytes(f.data[2:6], "little") for f in (theirs, ours)]
-                return f"the node runs a model with hash {found[0]:08x}, this process {found[1]:08x}; build the node from this model"
             if theirs != ours:
                 return f"sample {k}: the node sent {theirs.id:X}#{theirs.data.hex()}, this process {ours.id:X}#{ours.data.hex()}" + (
                     "; start the node with --rest" if k == 0 else ""

@@ -28,6 +28,7 @@ from hullguard.design.judges import judges, residual_columns
 from hullguard.errors import BusError, ExpectationError
 from hullguard.model.faults import FaultSpec
 from hullguard.model.schema import Model
+from hullguard.plant.told import ToldModel
 
 ANSWER_TIMEOUT_S = 10.0
 ALARMS = ("provisional", "confirmed")
@@ -129,6 +130,7 @@ class Run:
         closing = native.tables.closing
         self._order = [g for g in range(len(native.tables.groups)) if g != closing] + [closing]
         self.mismatch: str | None = None
+        self.told = ToldModel(native.library, design.model.name, native.tables.hash, native.node.status, native.tables.status)
 
     def samples(self, source: Source, count: int, watch: Callable[[int, Trace], None] | None = None) -> Trace:
         """Make `count` samples. `watch` is called after each."""
@@ -188,6 +190,7 @@ class Run:
         got = self.bus.answer(k, expected, time_s)
         for frame, _ in got:
             self._write(frame, time_s)  # a log has one clock, the run's
+            self.told.take(frame)
             told = read_verdict(self.native, frame)
             if told is not None and not self.pace.lockstep:
                 self.trace.heard.append(replace(told, k=k - (k - told.k) % 4096))
@@ -208,9 +211,6 @@ class Run:
 
     def _difference(self, k: int, frame: Frame, own: Frame, verdict: Verdict) -> str:
         """Why a node's frame is not the one that this process would have sent."""
-        if frame.id == own.id == self.native.tables.status.id and frame.data[2:6] != own.data[2:6]:
-            theirs, ours = (int.from_bytes(f.data[2:6], "little") for f in (frame, own))
-            return f"the node runs a model with hash {theirs:08x}, this process {ours:08x}; build the node from this model"
         told = read_verdict(self.native, frame)
         hint = "; start the node with --rest" if k == 0 else ""
         return f"sample {k}: the node says {told or frame.data.hex()}, this process {verdict}{hint}"
