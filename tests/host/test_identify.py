@@ -236,3 +236,20 @@ def test_wrong_input_is_one_line(cli: Cli, tmp_path: Path, given: Path, drive: t
 @pytest.mark.parametrize(("value", "wanted"), [(0.0, 0.0), (0.0123, 0.0123), (0.01231, 0.0124), (9.991, 10.0), (1234.0, 1240.0)])
 def test_bounds_are_rounded_up(value: float, wanted: float) -> None:
     assert rounded_up(value) == pytest.approx(wanted, rel=1e-12) and rounded_up(value) >= value
+
+
+def test_a_sensor_that_is_wired_the_wrong_way_round_is_doubted(cli: Cli, tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    made = cli("new", "own", "--A", "0.8 0.2; -0.1 0.7", "--B", "0; 1", "--C", "1 0; 0 1", "--discrete", "--sample-time", 1, "--out", path, "-q")
+    assert made.status == 0, made.err
+    model, rng = load_model(str(path)), np.random.default_rng(SEED)
+    rows, x = [], np.zeros(2)
+    for u in np.repeat(rng.uniform(-1.0, 1.0, 30), 5):
+        rows.append([*(x + 0.01 * rng.uniform(-1.0, 1.0, 2)), u])
+        x = model.plant.A @ x + model.plant.B[:, 0] * u
+    found = []
+    for name, sign in (("right", 1.0), ("wrong", -1.0)):
+        recording = write_csv(tmp_path / f"{name}.csv", model, np.array(rows) * [1.0, sign, 1.0])
+        done = cli("identify", path, "--csv", recording, "--out", tmp_path / name, "--hold-out", 0, "--lag-max", 0, "--json")
+        found.append(list(done.json["doubted"]))
+    assert found[0] == [] and found[1] == ["y2"]

@@ -127,6 +127,7 @@ BAD = [
     (("--from", "plant.xls"), ".mat"),
     ((*INLINE, "--sample-time", "0.05", "--range", "y9=0..1"), "no such name"),
     ((*INLINE, "--sample-time", "0.05", "--range", "y1=1..0"), "LOW..HIGH"),
+    (("--A", "0 1; -4 -0.8", "--B", "0 1", "--C", "1 0", "--sample-time", "0.05"), "semicolon"),
     ((*INLINE, "--sample-time", "0.05", "--outputs", "Y"), "lower-case"),
     ((*INLINE, "--sample-time", "0.05", "--outputs", "a,b"), "2 names"),
     ((*INLINE, "--builder", "car_following", "cars=2"), "one source"),
@@ -152,3 +153,15 @@ def test_nothing_that_is_read_runs(cli: Cli) -> None:
     Path("plant.mat").write_bytes(pickle.dumps(Harm()))
     refused(cli("new", "own", "--from", "plant.mat", "--sample-time", 1), 2, "plant.mat")
     assert not Path("harm").exists()
+
+
+def test_the_emulator_of_a_damped_plant_stays_within_half_of_every_range(cli: Cli) -> None:
+    """However its input steps between the ends of its reference: the worst case of the oscillator, summed here over its impulse response."""
+    assert cli("new", "own", *INLINE, "--sample-time", 0.05, "--range", "y1=-3..3", "-q").status == 0
+    model = load_model("own.toml")
+    assert model.plant.feedback is not None
+    reference = model.plant.feedback.reference_bound[0]
+    response, x = 0.0, model.plant.B[:, 0]
+    for _ in range(2000):
+        response, x = response + abs(x[0]), model.plant.A @ x
+    assert model.scenarios[0].reference.amplitude == reference and 1.3 < response * reference < 1.6

@@ -30,6 +30,7 @@ from hullguard.model.table import Array
 
 WIDER = 1.2  # times its half width: a range that a recording leaves
 SHOWN = 5  # contradictions
+DOUBTED = 0.25  # of all that a signal moves: noise that large is a model that explains little
 
 
 @dataclass(frozen=True)
@@ -278,6 +279,7 @@ def as_json(given: Given, found: Found, outcome: Outcome, target: Path) -> dict[
         "bounds": _bounds(found, mean),
         "threshold_shares": dict(zip(names, mean.tolist(), strict=True)),
         "threshold_shares_by_residual": outcome.share.tolist(),
+        "doubted": _doubted(given, found),
         "heavy_tails": fit.heavy, "cuts": fit.cuts,
         "window_factors": {"largest": fit.needs[0].factor, "usual": fit.usual},
         "tightest": asdict(fit.needs[0]),
@@ -311,6 +313,14 @@ def _bounds(found: Found, share: Array) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+def _doubted(given: Given, found: Found) -> dict[str, float]:
+    """Signals whose noise would have to be a large part of all that they move in the recordings, with that part."""
+    least = {p.name: float(b) for p, b in zip(found.structure.parameters, found.fit.bound, strict=True)}
+    moved = {s.name: max(float(np.ptp(r.series[:, i])) for r in given.fitted) for i, s in enumerate(given.model.signals)}
+    share = {name: 2 * least[f"noise of {name}"] / span for name, span in moved.items() if span > 0.0 and f"noise of {name}" in least}
+    return {name: part for name, part in share.items() if part >= DOUBTED}
+
+
 def _drive(d: tradeoff.Drive) -> dict[str, Any]:
     return {"false_alarms": {"provisional": d.provisional, "confirmed": d.confirmed}, "margin_max": d.margin, "frames": d.frames}
 
@@ -325,6 +335,8 @@ def describe(result: dict[str, Any]) -> list[str]:
         error = b["relative_error"]
         sure = "the data do not show it apart from the others" if error is None or error > 0.5 else f"told apart to {100 * error:.2g} %"
         lines.append(f"{b['name']}: at least {b['smallest']:.3g}, written {b['written']:g} (given {b['given']:g}); {sure}; {100 * b['share']:.3g} % of the thresholds")
+    for name, part in result["doubted"].items():
+        lines.append(f"noise of {name} is {100 * part:.3g} % of all that it moves: a wrong sign, unit or matrix? or a recording in which it hardly moves")
     worst, share = max(result["threshold_shares"].items(), key=lambda s: s[1])
     lines.append(f"what hurts detection most: {worst}, {100 * share:.3g} % of the thresholds; half of it would make them {50 * share:.3g} % smaller")
     t = result["tightest"]

@@ -66,7 +66,7 @@ def check(made: str, target: Path) -> None:
     try:
         reach(model, max(g.horizon for g in model.groups))
     except InputError as error:
-        raise InputError(f"{str(error).split(':')[0]}: nothing bounds it; measure it (a row of C), or give --state-range NAME=X") from error
+        raise InputError(f"{str(error).split(':')[0]}: measure it (a row of C), or say how far it goes with --state-range NAME=X") from error
     for i, spec in enumerate(model.observers):
         check_parity(sub_plant(model, spec, usual_radius(model)), spec.order_max, f"{target.name}: detector.observers[{i}]")
 
@@ -170,7 +170,7 @@ def _draft(args: argparse.Namespace, origin: str, lines: tuple[str, ...], states
     for known, found, what in (([*outputs, *inputs], ranges, "--range"), (list(states), bounds := dict(_bound(t) for t in args.state_range), "--state-range")):
         for name in found:
             if name not in known:
-                raise InputError(f"{what} {name}: there is no such name: {', '.join(known)}")
+                raise InputError(f"{what} {name}: there is no such name, only {', '.join(known)}")
     parts = [tuple(Part(n, *ranges.get(n, USUAL)) for n in names) for names in (outputs, inputs)]
     return Draft(args.name, origin, lines, sample_time_s, states, parts[0], parts[1], args.measured_inputs, False, DRIVEN, bounds, args.disturbance, args.noise)
 

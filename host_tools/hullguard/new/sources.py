@@ -62,9 +62,10 @@ def state_space(found: dict[str, Any], where: str) -> StateSpace:
     n, m = A.shape[0], C.shape[0]
     B = made.get("B", np.zeros((n, 0)))
     D = made.get("D", np.zeros((m, B.shape[1])))
-    for key, shape, wanted in (("A", A.shape, (n, n)), ("B", B.shape, (n, B.shape[1])), ("C", C.shape, (m, n)), ("D", D.shape, (m, B.shape[1]))):
+    for key, shape, wanted in (("A", A.shape, (n, n)), ("B", B.shape, (n, B.shape[1] if len(B) == n else 1)), ("C", C.shape, (m, n)), ("D", D.shape, (m, B.shape[1]))):
         if shape != wanted:
-            raise InputError(f"{where}: {key} is {shape[0]} x {shape[1]}, expected {wanted[0]} x {wanted[1]}")
+            cure = '; a row a state, and rows end with a semicolon: "0; 1"' if key == "B" else ""
+            raise InputError(f"{where}: {key} is {shape[0]} x {shape[1]}, expected {wanted[0]} x {wanted[1]}{cure}")
     time = next((found[k] for k in TIMES if k in found), None)
     if time is None:
         return StateSpace(A, B, C, D, None, False)

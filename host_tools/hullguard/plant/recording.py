@@ -21,6 +21,8 @@ def read_columns(path: Path, names: Sequence[str], period: float, who: str) -> A
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(file))
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: not a readable CSV file ({error})") from error
     if not rows:
@@ -30,7 +32,8 @@ def read_columns(path: Path, names: Sequence[str], period: float, who: str) -> A
     for name in names:
         if header.count(name) != 1:
             problem = "is missing" if name not in header else "is there twice"
-            raise InputError(f"{path.name}: column '{name}' {problem}; the model {who} needs {', '.join(names)}")
+            cure = "" if len(header) > 1 else "; columns are separated by commas, numbers have a decimal point"
+            raise InputError(f"{path.name}: column '{name}' {problem}; the model {who} needs {', '.join(names)}{cure}")
         columns[name] = header.index(name)
     body = [(i, r) for i, r in enumerate(rows[1:], 2) if any(c.strip() for c in r)]
     if not body:
