@@ -149,10 +149,10 @@ void proof_e2e_valid(void)
  *  jump `resync` frames in sequence are refused.
  *  Any profile, any two numbers below NUMBERS, any step, resynchronisation or none.
  *  @proves hg_e2e_sequence hg_e2e_repeated hg_e2e_receiver_start hg_e2e_modulus
- *  @run check real=f32 unwind=2 limit=60 PROFILE=HG_E2E_P01
- *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P22
- *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P05
- *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_NONE
+ *  @run deep real=f32 unwind=2 limit=3600 PROFILE=HG_E2E_P01
+ *  @run deep real=f32 unwind=2 limit=3600 PROFILE=HG_E2E_P22
+ *  @run deep real=f32 unwind=2 limit=3600 PROFILE=HG_E2E_P05
+ *  @run deep real=f32 unwind=2 limit=3600 PROFILE=HG_E2E_NONE
  *  @run deep real=f32 unwind=2 limit=3600 */
 void proof_e2e_sequence(void)
 {

@@ -55,8 +55,8 @@ void proof_frame_round(void)
  *  Any valid message of one integer field in a frame of up to LENGTH bytes, of byte order and sign FLAGS; any valid code.
  *  @proves hg_frame_pack
  *  @without conversion: the bytes of a pattern are cut to 8 bits on purpose
- *  @run check real=f32 unwind=33 limit=30 LENGTH=2U FLAGS=0U
- *  @run check real=f32 unwind=33 limit=30 LENGTH=2U FLAGS=3U
+ *  @run deep real=f32 unwind=33 limit=3600 LENGTH=2U FLAGS=0U
+ *  @run deep real=f32 unwind=33 limit=3600 LENGTH=2U FLAGS=3U
  *  @run deep real=f32 unwind=65 limit=3600 LENGTH=8U FLAGS=2U
  *  @run deep real=f32 unwind=65 limit=3600 LENGTH=8U FLAGS=1U */
 void proof_frame_layout(void)

@@ -61,7 +61,7 @@ static hg_fusion_config any_config(tables *t)
  *  @proves hg_fusion_start hg_fusion_valid hg_fusion_reset hg_fusion_open hg_fusion_due hg_fusion_receive hg_fusion_unwrap hg_fusion_local hg_fusion_number hg_fusion_recall
  *  @proves hg_fusion_exclude hg_fusion_alive
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run check real=f32 unwind=4 limit=60 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=0U SAMPLES=1U MODULUS=4U ANY_NUMBERS
+ *  @run deep real=f32 unwind=4 limit=3600 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=0U SAMPLES=1U MODULUS=4U ANY_NUMBERS
  *  @run deep real=f32 unwind=5 limit=7200 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:17 STATES=2U SENSORS=2U DEPTH=2U SAMPLES=2U MODULUS=16U */
 void proof_fusion(void)
 {
@@ -111,7 +111,7 @@ void proof_fusion(void)
  *  STATES states, SENSORS sensors, DEPTH past samples; any tables that hg_fusion_valid() accepts; a start and a sample with any frame of it, or none.
  *  @proves hg_fusion_close hg_fusion_open hg_fusion_receive hg_fusion_reset
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run check real=f32 unwind=4 limit=60 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=0U MODULUS=4U ANY_NUMBERS
+ *  @run deep real=f32 unwind=4 limit=3600 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=0U MODULUS=4U ANY_NUMBERS
  *  @run deep real=f32 unwind=4 limit=3600 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=1U MODULUS=4U ANY_NUMBERS */
 void proof_fusion_close(void)
 {

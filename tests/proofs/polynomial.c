@@ -31,7 +31,7 @@ void proof_polynomial_count(void)
  *  @proves hg_polynomial_start hg_polynomial_valid hg_polynomial_reset hg_polynomial_step
  *  @proves hg_statistic_start hg_statistic_valid hg_statistic_reals hg_statistic_reset hg_statistic_step hg_statistic_ready
  *  @without unsigned-overflow: products of sizes are checked before they are used
- *  @run check real=f32 unwind=300 limit=120 ANY_NUMBERS
+ *  @run deep real=f32 unwind=300 limit=3600 ANY_NUMBERS
  *  @run deep real=f64 unwind=300 limit=3600 */
 void proof_polynomial_step(void)
 {

@@ -301,7 +301,7 @@ def say(gate: str, outcomes: Sequence[Outcome]) -> None:
     """What the gate promises: the first sentence of each proof, and what was proven of it."""
     said = [
         (
-            "No undefined behaviour, no overrun of an array and no endless loop in any public function, for all inputs its header allows, at the sizes below",
+            "No undefined behaviour, no overrun of an array and no endless loop in these public functions, for all inputs their headers allow, at the sizes below",
             f"{len({f for o in outcomes for f in o.proof.proves})} of {len(public_functions())} public functions, {len(outcomes)} runs of "
             f"{len({o.proof for o in outcomes})} proofs, {sum(o.properties for o in outcomes)} properties proven",
         )

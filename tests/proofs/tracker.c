@@ -10,7 +10,7 @@
  *  The tables of fusion5; FRAMES frames of any identifier, kind, length and bytes after a start, any clock.
  *  @proves hg_tracker_start hg_tracker_receive hg_tracker_expect hg_tracker_overdue hg_tracker_outage hg_tracker_health
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=60 FRAMES=1U ANY_NUMBERS
+ *  @run deep real=f32 unwind=65 limit=3600 FRAMES=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=65 limit=7200 FRAMES=2U */
 void proof_tracker_receive(void)
 {
@@ -46,7 +46,7 @@ void proof_tracker_receive(void)
  *  The tables of fusion5; a start, a reading of any value, a sample whose tick did not come.
  *  @proves hg_tracker_overdue hg_tracker_step hg_tracker_report hg_tracker_estimate hg_tracker_digest hg_fusion_sender_start hg_fusion_sender_step
  *  @without conversion unsigned-overflow: sample indices, stamps and the digest are meant to wrap, bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=60 ANY_NUMBERS */
+ *  @run deep real=f32 unwind=65 limit=3600 ANY_NUMBERS */
 void proof_tracker_step(void)
 {
     static hg_fusion5_tracker storage;

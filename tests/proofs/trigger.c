@@ -76,7 +76,7 @@ void proof_trigger_step(void)
  *  larger for a smaller distance.
  *  Any tables of WIDTH channels and LEVELS levels at most, any code.
  *  @proves hg_trigger_threshold
- *  @run check real=f32 unwind=5 limit=30 WIDTH=1U LEVELS=1U */
+ *  @run deep real=f32 unwind=5 limit=3600 WIDTH=1U LEVELS=1U */
 void proof_trigger_threshold(void)
 {
     tables t;

@@ -7,7 +7,7 @@
 /** The running sums are those of the samples in the window, exactly, and the sensor is silent only with a full window; null pointers and numbers out of range are refused.
  *  A window of WINDOW, SAMPLES samples of any codes of BITS bits, with and without trend.
  *  @proves hg_variance_start hg_variance_step
- *  @run check real=f32 unwind=8 limit=60 WINDOW=3U SAMPLES=5U BITS=4
+ *  @run deep real=f32 unwind=8 limit=3600 WINDOW=3U SAMPLES=4U BITS=3
  *  @run deep real=f32 unwind=10 limit=3600 WINDOW=4U SAMPLES=8U BITS=8 */
 void proof_variance_sums(void)
 {
@@ -49,7 +49,7 @@ void proof_variance_sums(void)
  *  Any sums with |S1| <= W 2^15, 0 <= S2 <= W 2^30, |T1| <= W^2 2^14 and |2 T1 - (W - 1) S1| <= W^2 2^14, which the samples' own have; a window that fills with any
  *  code, and a full one whose oldest and newest samples are 0.
  *  @proves hg_variance_step
- *  @run check real=f32 unwind=4 limit=60 WINDOW=255 */
+ *  @run deep real=f32 unwind=4 limit=3600 WINDOW=255 */
 void proof_variance_range(void)
 {
     int16_t memory[WINDOW];

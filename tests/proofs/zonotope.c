@@ -11,7 +11,7 @@
  *  rewritten of the past.
  *  ORDER rows, RESIDUALS residuals, WIDTH signals out of SIGNALS, DISTURBANCES disturbances, COLUMNS columns; any tables that hg_zonotope_valid() accepts, any set, any radii.
  *  @proves hg_zonotope_start hg_zonotope_valid hg_zonotope_reset hg_zonotope_step hg_zonotope_widen hg_zonotope_ready
- *  @run check real=f32 unwind=6 limit=60 ORDER=1U RESIDUALS=1U WIDTH=1U SIGNALS=1U DISTURBANCES=1U COLUMNS=1U ANY_NUMBERS
+ *  @run deep real=f32 unwind=6 limit=3600 ORDER=1U RESIDUALS=1U WIDTH=1U SIGNALS=1U DISTURBANCES=1U COLUMNS=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=10 limit=3600 ORDER=2U RESIDUALS=1U WIDTH=1U SIGNALS=1U DISTURBANCES=1U COLUMNS=2U ANY_NUMBERS
  *  @run deep real=f32 unwind=20 limit=7200 ORDER=3U RESIDUALS=2U WIDTH=2U SIGNALS=2U DISTURBANCES=1U COLUMNS=4U */
 void proof_zonotope_step(void)
