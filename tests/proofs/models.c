@@ -19,9 +19,9 @@
  *  @without conversion: bytes and checksums are cut on purpose
  *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=platoon
  *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=openacc
- *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=suspension
+ *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=suspension
  *  @run check real=f32 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=battery_cell
- *  @run deep real=q31 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=platoon
+ *  @run check real=q31 unwind=65 limit=30 hg_e2e_valid.0:513 MODEL=platoon
  *  @run deep real=q31 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=platoon_bank
  *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=two_state
  *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=quadratic_sensor
