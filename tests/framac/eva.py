@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""Judge what Eva said: every alarm has its reason in the table, every entry of the table its alarm, every public function was reached, or stands
+in the table as one that no driver reaches yet. Both lists may only become shorter.
+
+    eva.py TABLE RESULT CSV ..    CSV: properties of a driver (frama-c -report-csv), beside it .log with the coverage of the run
+"""
+
+import csv
+import json
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+COPY = re.compile(r"_\d+$")
+DEFINED = re.compile(r"^(?!static|typedef|return|else)[a-z_][\w ]*[ *](hg_\w+)\([^;]*$", re.MULTILINE)
+SETTLED = ("Valid", "Considered valid", "Dead", "Untried")
+
+Alarm = tuple[str, str, str]  # file, function, property
+
+
+def alarms(path: Path) -> set[Alarm]:
+    """What a driver leaves open in the library, without line numbers."""
+    with path.open(newline="") as lines:
+        rows = list(csv.DictReader(lines, delimiter="\t"))
+    open_rows = [row for row in rows if row["status"] not in SETTLED]
+    if not rows:
+        sys.exit(f"{path}: no property at all: Eva has not run")
+    return {(f"{row['directory']}/{row['file']}", COPY.sub("", row["function"]), row["property"]) for row in open_rows}
+
+
+def names_of(log: Path) -> set[str]:
+    """Functions that a run has reached."""
+    text = log.read_text()
+    reached = set()
+    for line in text.splitlines():
+        match = re.match(r"^\s+(\w+): (\d+) stmts out of (\d+)", line)
+        if match is not None and int(match[2]) > 0:
+            reached.add(COPY.sub("", match[1]))
+    if not reached:
+        sys.exit(f"{log}: nothing was reached: Eva has not run")
+    return reached
+
+
+def public() -> set[str]:
+    """Functions with external linkage of the library."""
+    found: set[str] = set()
+    for source in sorted((ROOT / "firmware/src").glob("*.c")):
+        found |= set(DEFINED.findall(source.read_text()))
+    return found
+
+
+def entries(path: Path) -> tuple[dict[Alarm, str], set[str]]:
+    """The table: alarm and its reason; functions that no driver reaches yet."""
+    with path.open("rb") as file:
+        table = tomllib.load(file)
+    return {(one["file"], one["function"], one["property"]): one["reason"] for one in table.get("alarm", [])}, set(table.get("unreached", []))
+
+
+def main() -> int:
+    """Command line."""
+    table, result, files = Path(sys.argv[1]), Path(sys.argv[2]), [Path(name) for name in sys.argv[3:]]
+    known, left_out = entries(table)
+    found: set[Alarm] = set()
+    reached: set[str] = set()
+    for path in files:
+        found |= alarms(path)
+        reached |= names_of(path.with_suffix(".log"))
+    bad = [f"alarm without a reason in {table.name}: {file}: {function}: {text}" for file, function, text in sorted(found - set(known))]
+    bad += [f"{table.name} has a reason for what is no alarm any more, take it out: {file}: {function}: {text}" for file, function, text in sorted(set(known) - found)]
+    missing = sorted(public() - reached)
+    bad += [f"no driver reaches {name}()" for name in missing if name not in left_out]
+    bad += [f"{table.name}: {name}() is reached now, take it out" for name in sorted(left_out - set(missing))]
+    for line in bad:
+        print(line)
+    if bad:
+        return 1
+    functions = len(public())
+    promise = {
+        "promise": "No undefined behaviour of memory, integers, shifts, conversions or uninitialised data in any run, however long, "
+        "of these models with any frame, any input and any order of calls, but for the places that tests/framac/alarms.toml gives a reason for",
+        "result": f"{len(files)} models, {functions - len(missing)} of {functions} public functions reached, {len(known)} alarms, each with its reason",
+    }
+    result.parent.mkdir(parents=True, exist_ok=True)
+    result.write_text(json.dumps({"gate": "eva", "command": "make eva", "promises": [promise]}, indent=1) + "\n")
+    print(f"  ok  eva: {promise['result']}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

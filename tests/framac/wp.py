@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""Prove the kernels' contracts for inputs of any length: contracts go into a copy of the library, Frama-C WP makes goals of them, z3 proves each.
+
+    wp.py RESULT WORK [CASE ..]    CASE: tests/framac/wp/CASE.acsl; without one all of them
+
+A .acsl file: `file PATH`, `real f32|q31`, `functions NAME ..`, `goals N`; then blocks `before TEXT` (a line of the source, blanks at its ends aside, that
+stands there once; `first TEXT`: the first of several; `in PATH` before it: of another file) followed by the annotation that goes before it, up to the next block. A number of goals that is not N is an error, so that none vanishes.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+TIMEOUT_S = 20  # of one goal; most take less than 0.1
+PROVED = re.compile(r"Proved goals:\s+(\d+) / (\d+)")
+
+
+@dataclass
+class Case:
+    """One file with contracts."""
+
+    name: str
+    file: str = ""
+    real: str = "f32"
+    functions: list[str] = field(default_factory=list)
+    goals: int = 0
+    blocks: list[tuple[str, str, bool, list[str]]] = field(default_factory=list)
+
+
+def read(path: Path) -> Case:
+    """A .acsl file."""
+    case = Case(path.stem)
+    into = ""
+    for line in path.read_text().splitlines():
+        key, _, rest = line.partition(" ")
+        if key in ("before", "first"):
+            case.blocks.append((into or case.file, rest.strip(), key == "first", []))
+        elif key == "in":
+            into = rest
+        elif case.blocks:
+            case.blocks[-1][3].append(line)
+        elif key == "file":
+            case.file = rest
+        elif key == "real":
+            case.real = rest
+        elif key == "functions":
+            case.functions += rest.split()
+        elif key == "goals":
+            case.goals = int(rest)
+        elif line and not line.startswith("#"):
+            sys.exit(f"{path.name}: '{line}' is neither a key nor in a block")
+    return case
+
+
+def annotate(case: Case, tree: Path) -> None:
+    """Put the contracts into the copy."""
+    for file, anchor, first, block in case.blocks:
+        target = tree / file
+        lines = target.read_text().splitlines()
+        places = [number for number, text in enumerate(lines) if text.strip() == anchor]
+        if not places or (len(places) > 1 and not first):
+            sys.exit(f"{case.name}.acsl: '{anchor}' stands {len(places)} times in {file}; it must be there once")
+        lines[places[0] : places[0]] = block
+        target.write_text("\n".join(lines) + "\n")
+
+
+def environment(work: Path) -> dict[str, str]:
+    """Why3 finds its provers in a file of this build, nothing in the home directory."""
+    config = work / "why3.conf"
+    own = {**os.environ, "WHY3CONFIG": str(config)}
+    if not config.exists():
+        for tool in ("frama-c", "why3", "z3"):
+            if shutil.which(tool) is None:
+                sys.exit(f"{tool} is missing: host_tools/setup.sh check")
+        subprocess.run(["why3", "config", "detect"], env=own, check=True, capture_output=True)
+    return own
+
+
+def prove(case: Case, work: Path, env: dict[str, str]) -> bool:
+    """Run one case; print what is not proved."""
+    tree = work / case.name
+    shutil.rmtree(tree, ignore_errors=True)
+    shutil.copytree(ROOT / "firmware", tree / "firmware", ignore=shutil.ignore_patterns("models", "apps", "examples", "zephyr"))
+    annotate(case, tree)
+    include = tree / "firmware/include"
+    source = tree / case.file
+    if source.suffix == ".h":
+        source = tree / "wp.c"
+        source.write_text(f'#include "{case.file.removeprefix("firmware/include/")}"\n')
+    command = ["frama-c", "-machdep", "gcc_x86_64", f"-cpp-extra-args=-I{include} -DHG_REAL_{case.real.upper()}=1", "-warn-special-float", "none"]
+    command += ["-wp", "-wp-rte", "-wp-prover", "z3", "-wp-timeout", str(TIMEOUT_S), "-wp-par", "1", "-wp-cache", "none", "-wp-fct", ",".join(case.functions), str(source)]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    (work / f"{case.name}.log").write_text(done.stdout + done.stderr)
+    match = PROVED.search(done.stdout)
+    if done.returncode != 0 or match is None:
+        print(f"{case.name}: frama-c failed:\n{(done.stdout + done.stderr)[-1500:]}")
+        return False
+    proved, goals = int(match[1]), int(match[2])
+    for line in re.findall(r"^\[wp\] \[(?:Timeout|Unknown|Failed|Stepout)\].*$", done.stdout, re.MULTILINE):
+        print(f"{case.name}: not proved: {line}")
+    if goals != case.goals:
+        print(f"{case.name}: {goals} goals, {case.goals} expected: contracts have changed, or vanished")
+    return proved == goals == case.goals
+
+
+def main() -> int:
+    """Command line."""
+    result, work = Path(sys.argv[1]), Path(sys.argv[2]).resolve()
+    names = sys.argv[3:] or sorted(path.stem for path in (HERE / "wp").glob("*.acsl"))
+    work.mkdir(parents=True, exist_ok=True)
+    env = environment(work)
+    cases = [read(HERE / "wp" / f"{name}.acsl") for name in names]
+    good = [prove(case, work, env) for case in cases]
+    if not all(good):
+        return 1
+    goals, functions = sum(case.goals for case in cases), sum(len(case.functions) for case in cases)
+    text = f"{functions} functions, {goals} goals, all proved by z3"
+    if len(sys.argv) == 3:
+        promise = {
+            "promise": "Kernels with loops over rings, frames, tables and counters stay inside their memory and have no undefined behaviour for inputs of any length, and do what their contracts say",
+            "result": text,
+        }
+        result.parent.mkdir(parents=True, exist_ok=True)
+        result.write_text(json.dumps({"gate": "wp", "command": "make wp", "promises": [promise]}, indent=1) + "\n")
+    print(f"  ok  wp: {text}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
