@@ -1,4 +1,4 @@
-# Frama-C: Eva runs real models for ever with any input (eva_*.c), WP proves kernels for inputs of any length (wp.py). Their results stand in
+# Frama-C: Eva runs real models for ever with any input (eva_*.c), WP proves contracts of kernels (wp.py, wp/). Their results stand in
 # build/framac/; what Eva cannot show by itself stands in alarms.toml, with the reason.
 
 FRAMAC      := $(BUILD)/framac
@@ -27,6 +27,6 @@ eva: $(EVA_DRIVERS:%=$(FRAMAC)/%.csv) ## no undefined behaviour in any run of re
 CHECK_PARTS += eva
 
 .PHONY: wp
-wp: ## contracts of kernels, for inputs of any length (Frama-C WP, z3)
+wp: ## contracts of saturating counters and of fixed point (Frama-C WP, z3)
 	@$(PY) tests/framac/wp.py $(BUILD)/results/wp.json $(FRAMAC)/wp
 CHECK_PARTS += wp

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Prove the kernels' contracts for inputs of any length: contracts go into a copy of the library, Frama-C WP makes goals of them, z3 proves each.
+"""Prove the kernels' contracts for any input: contracts go into a copy of the library, Frama-C WP makes goals of them, z3 proves each.
 
     wp.py RESULT WORK [CASE ..]    CASE: tests/framac/wp/CASE.acsl; without one all of them
 
-A .acsl file: `file PATH`, `real f32|q31`, `functions NAME ..`, `goals N`; then blocks `before TEXT` (a line of the source, blanks at its ends aside, that
-stands there once; `first TEXT`: the first of several; `in PATH` before it: of another file) followed by the annotation that goes before it, up to the next block. A number of goals that is not N is an error, so that none vanishes.
+A .acsl file: `file PATH`, `real f32|q31`, `functions NAME ..`, `goals N`; then blocks, each `before TEXT` (a line of the source, blanks at its ends
+aside, that stands there once; `first TEXT`: the first of several; `in PATH` before it: of another file) and the annotation that goes before that line.
+A number of goals that is not N is an error, so that none vanishes.
 """
 
 import json
@@ -124,7 +125,7 @@ def main() -> int:
     text = f"{functions} functions, {goals} goals, all proved by z3"
     if len(sys.argv) == 3:
         promise = {
-            "promise": "Kernels with loops over rings, frames, tables and counters stay inside their memory and have no undefined behaviour for inputs of any length, and do what their contracts say",
+            "promise": "Saturating counters and the sums of fixed point stop at their ends, are exact inside them, and have no undefined behaviour, for any input",
             "result": text,
         }
         result.parent.mkdir(parents=True, exist_ok=True)
