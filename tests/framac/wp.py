@@ -104,7 +104,7 @@ def prove(case: Case, work: Path, env: dict[str, str]) -> bool:
         print(f"{case.name}: frama-c failed:\n{(done.stdout + done.stderr)[-1500:]}")
         return False
     proved, goals = int(match[1]), int(match[2])
-    for line in re.findall(r"^\[wp\] \[(?:Timeout|Unknown|Failed|Stepout)\].*$", done.stdout, re.MULTILINE):
+    for line in re.findall(r"^\[wp\] \[.*\] Goal (\S+ : (?:Failed|Unknown|Timeout|Stepout))", done.stdout, re.MULTILINE):
         print(f"{case.name}: not proved: {line}")
     if goals != case.goals:
         print(f"{case.name}: {goals} goals, {case.goals} expected: contracts have changed, or vanished")
