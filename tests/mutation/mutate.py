@@ -191,7 +191,7 @@ class Mutator:
             return [("result", "true"), ("result", "false")] + ([] if negated or text in {"true", "false"} else [("result", f"!({text})")])
         if self.returns == "hg_status":
             return [("result", "HG_E_STATE")] if text == "HG_OK" else [("result", "HG_OK")]
-        if self.returns in {"*", "void"} or self.returns[:3] == "hg_" and self.returns not in {"hg_real", "hg_acc"}:
+        if self.returns in {"*", "void"} or (self.returns[:3] == "hg_" and self.returns not in {"hg_real", "hg_acc"}):
             return []
         return [("result", f"({text}) + 1"), ("result", "0")]
 
@@ -201,7 +201,7 @@ class Mutator:
         return parent is not None and parent.type in kinds and parent.child_by_field_name("condition") == node
 
     def is_value(self, node: Node) -> bool:
-        return node.parent is not None and node.parent.type not in {"init_declarator", "parameter_declaration", "field_declaration"} or self.is_initial(node)
+        return (node.parent is not None and node.parent.type not in {"init_declarator", "parameter_declaration", "field_declaration"}) or self.is_initial(node)
 
     def is_initial(self, node: Node) -> bool:
         return node.parent is not None and node.parent.child_by_field_name("value") == node

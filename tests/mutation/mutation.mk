@@ -2,13 +2,15 @@
 # make mutation-deep: all.
 
 MUTATION := $(BUILD)/mutation
-MUTATION_BUILDS := f32 q31
+MUTATION_BUILDS := f32 q31 only
 MUTATION_CC = $(CLANG) -O1 -w -fPIC -ftrivial-auto-var-init=pattern
 MUTATION_TOOLS = $(wildcard tests/mutation/*.py tests/mutation/*.toml)
 
 .PHONY: mutation mutation-deep
-mutation: $(MUTATION)/built $(MUTATION_TOOLS) ## faults put into the library (a sample by HULLGUARD_SEED): the unit tests must notice each
-	@$(PY) tests/mutation/run.py --results $(BUILD)/results/mutation.json --sample 300 $(MUTATION) $(MUTATION_BUILDS)
+CHECK_PARTS += mutation
+DEEP_PARTS  += mutation-deep
+mutation: $(MUTATION)/built $(MUTATION_TOOLS) ## faults put into the library: the unit tests must notice each; a sample by HULLGUARD_SEED, or all of MODULES
+	@$(PY) tests/mutation/run.py --results $(BUILD)/results/mutation.json $(or $(MODULES:%=--module %),--sample 200) $(MUTATION) $(MUTATION_BUILDS)
 mutation-deep: $(MUTATION)/built $(MUTATION_TOOLS) ## the same with every fault that can be put in
 	@$(PY) tests/mutation/run.py --results $(BUILD)/results/mutation-deep.json $(MUTATION) $(MUTATION_BUILDS)
 

@@ -160,6 +160,26 @@ static void at_its_threshold_a_certificate_is_between(void **state)
     assert_int_equal(1, closest_of(2.0, 1.0, 2.0, 0.5));
 }
 
+/* What does not fit gives the first certificate's threshold, and says so. */
+static void after_an_overflow_the_first_certificate_speaks(void **state)
+{
+    (void)state;
+    rig b;
+    const hg_real weight[3] = {R(0.5), R(1), R(2)};
+    const hg_real bias[3] = {R(1), R(0.5), R(0.25)};
+    const hg_bank_config c = {.certificates = 3U, .window = 1U, .width = 1U, .signal = signal_list, .weight = weight, .bias = bias, .widen = R(1)};
+    const hg_real one[VALUES] = {R(1), R(1), R(1)};
+    const hg_real large[VALUES] = {R(0), R(0), HG_REAL_MAX};
+    const hg_real radius[RADII] = {R(0)};
+    begin(&b, &c);
+    assert_status(HG_OK, step(&b, one, radius));
+    assert_int_equal(2, b.self.closest);
+    assert_status(HG_E_NUMERIC, step(&b, large, radius));
+    assert_int_equal(0, b.self.closest);
+    assert_real(0.0, b.r[0]);
+    assert_real(1.0, b.J[0]);
+}
+
 static void validity_looks_at_every_place(void **state)
 {
     (void)state;
@@ -171,7 +191,10 @@ static void validity_looks_at_every_place(void **state)
         assert_false(hg_bank_valid(&c, VALUES, RADII, LENGTH));
         places[g] = VALUES - 1U;
         assert_true(hg_bank_valid(&c, VALUES, RADII, LENGTH));
+        c.extras = 0U;
+        assert_true(hg_bank_valid(&c, VALUES, VALUES, LENGTH));
         assert_false(hg_bank_valid(&c, VALUES, VALUES - 1U, LENGTH)); /* has a value and no radius */
+        c.extras = EXTRAS;
         places[g] = 255U;
         assert_false(hg_bank_valid(&c, 255U, 255U, LENGTH));
         c = usual;
@@ -476,6 +499,7 @@ int main(void)
         cmocka_unit_test(validity_looks_at_every_number_and_table),
         cmocka_unit_test(the_smallest_bank_is_taken),
         cmocka_unit_test(at_its_threshold_a_certificate_is_between),
+        cmocka_unit_test(after_an_overflow_the_first_certificate_speaks),
         cmocka_unit_test(validity_looks_at_every_place),
         cmocka_unit_test(a_window_of_one_computes_by_hand),
         cmocka_unit_test(nothing_is_said_before_the_window_is_full),

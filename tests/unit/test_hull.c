@@ -87,9 +87,9 @@ static void start_tells_bad_tables(void **state)
     const uint8_t outside[IN] = {0U, SIGNALS};
     const uint8_t long_taps[IN] = {LENGTH, 2U};
     const uint8_t most_taps[IN] = {MOST, 255U};
-    const hg_real bad[][OUT] = {{R(0), R(-0.1), R(0)}, {R(1), R(0), R(0)}, {R(0), R(0), REAL_NAN}, {REAL_INF, R(0), R(0)}};
+    const hg_real bad[][OUT] = {{R(0), R(-0.1), R(0)}, {R(1), R(0), R(0)}, {R(0), R(0), R(-1)}, {R(0), R(0), R(1)}, {R(0), R(0), REAL_NAN}, {REAL_INF, R(0), R(0)}};
     const uint8_t all_taps[IN] = {255U, 255U};
-    hg_hull_config c[25];
+    hg_hull_config c[27];
     for (size_t i = 0U; i < COUNT(c); i++) {
         c[i] = usual;
     }

@@ -93,6 +93,68 @@ static void settle(rig *p)
     }
 }
 
+/* No size may be 0, though the tables agree about it; 1 is one. */
+static void nothing_is_no_size(void **state)
+{
+    (void)state;
+    hg_predict_config c = usual;
+    c.order = c.correct.rows = c.state.rows = c.state.cols = c.drive.rows = c.output.cols = 0U;
+    assert_false(hg_predict_valid(&c, SIGNALS));
+    c = usual;
+    c.width = c.correct.cols = c.output.rows = c.direct.rows = 0U;
+    assert_false(hg_predict_valid(&c, SIGNALS));
+    c = usual;
+    c.inputs = c.drive.cols = c.direct.cols = 0U;
+    assert_false(hg_predict_valid(&c, SIGNALS));
+    c = usual;
+    c.order = c.correct.rows = c.state.rows = c.state.cols = c.drive.rows = c.output.cols = 1U;
+    c.width = c.correct.cols = c.output.rows = c.direct.rows = 1U;
+    c.inputs = c.drive.cols = c.direct.cols = 1U;
+    assert_true(hg_predict_valid(&c, SIGNALS));
+    c.first = SIGNALS - 1U;
+    assert_true(hg_predict_valid(&c, SIGNALS));
+    c.first = SIGNALS;
+    assert_false(hg_predict_valid(&c, SIGNALS));
+}
+
+/* Five states that move on by one place: none is overwritten before it has been read. */
+static void a_state_of_many_moves_as_one(void **state)
+{
+    (void)state;
+    static const hg_real turn[5U * 5U] = {R(0), R(1), R(0), R(0), R(0), R(0), R(0), R(1), R(0), R(0), R(0), R(0), R(0), R(1), R(0),
+                                          R(0), R(0), R(0), R(0), R(1), R(1), R(0), R(0), R(0), R(1)};
+    static const hg_real none[5] = {R(0)};
+    static const hg_real gain[5] = {R(1), R(2), R(4), R(8), R(16)};
+    static const hg_real first[5] = {R(1)};
+    static const hg_real wide[1] = {R(1)};
+    static const uint8_t input = 3U;
+    const hg_predict_config c = {.first = FIRST, .order = 5U, .width = 1U, .inputs = 1U, .input = &input, .known = known_table, .correct = {5U, 1U, 0, gain},
+        .state = {5U, 5U, 0, turn}, .drive = {5U, 1U, 0, none}, .output = {1U, 5U, 0, first}, .direct = {1U, 1U, 0, none}, .fresh = fresh_table, .horizon = 1U,
+        .radius = wide, .settle = SETTLE};
+    hg_predict self;
+    hg_real memory[HG_PREDICT_REALS(5, 1, 1)];
+    const hg_real radius[SIGNALS] = {R(0)};
+    double x[5] = {0.0, 0.0, 0.0, 0.0, 0.0};
+    assert_true(hg_predict_valid(&c, SIGNALS));
+    assert_status(HG_OK, hg_predict_start(&self, &c, memory));
+    for (int k = 0; k < 12; k++) {
+        const hg_real value[SIGNALS] = {R(0), R((k * k) % 7), R(0), R(0)};
+        hg_real out[1];
+        hg_real out_radius[1];
+        hg_predict_step(&self, 0U, value, radius, out, out_radius);
+        const double wrong = (double)value[1] - x[0];
+        double next[5];
+        for (size_t i = 0U; i < 5U; i++) {
+            next[i] = x[(i + 1U) % 5U] + ((double)gain[(i + 1U) % 5U] * wrong);
+        }
+        next[4] += x[4] + ((double)gain[4] * wrong); /* the last stays as well */
+        (void)memcpy(x, next, sizeof(x));
+        for (size_t i = 0U; i < 5U; i++) {
+            assert_real(x[i], self.x[i]);
+        }
+    }
+}
+
 static void start_tells_null(void **state)
 {
     (void)state;
@@ -510,6 +572,8 @@ static void predictions_follow_the_definition(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_is_no_size),
+        cmocka_unit_test(a_state_of_many_moves_as_one),
         cmocka_unit_test(start_tells_null),
         cmocka_unit_test(validity_looks_at_every_number_and_table),
         cmocka_unit_test(samples_compute_by_hand),

@@ -204,6 +204,11 @@ static void what_did_not_fit_has_no_code(void **state)
         assert_int_equal(HG_CODE_INVALID, hg_code_encode(&scale, outside[i]));
     }
     assert_int_equal(HG_CODE_INVALID, hg_code_encode(&scale, HG_REAL_MAX)); /* 65536 codes */
+    const hg_code_scale high = scale_of(HG_REAL_C(0.5), -15, HG_REAL_C(0.75));
+    const hg_code_scale low = scale_of(HG_REAL_C(0.5), -15, HG_REAL_C(-0.75));
+    assert_int_equal(16384, hg_code_encode(&high, HG_REAL_MAX)); /* what saturated lies within this range, and is not taken for a number of it */
+    assert_int_equal(HG_CODE_INVALID, hg_code_encode(&high, INT32_MAX));
+    assert_int_equal(HG_CODE_INVALID, hg_code_encode(&low, -INT32_MAX));
     assert_int_equal(INT32_MAX, hg_code_value(&scale, INT32_MAX));
     assert_int_equal(-INT32_MAX, hg_code_value(&scale, INT32_MIN));
 }

@@ -257,6 +257,30 @@ static void becoming_or_ceasing_to_be_invalid_is_worth_a_frame(void **state)
     assert_status(HG_OK, hg_trigger_step(&self, &zero));
 }
 
+/* The code next to HG_CODE_INVALID is a value: however wide the threshold, each channel tells the one from the other by its own codes. */
+static void validity_is_not_a_matter_of_distance(void **state)
+{
+    (void)state;
+    const uint16_t none[WIDTH] = {0U, 0U};
+    const int32_t wide[WIDTH] = {INT32_MAX, INT32_MAX};
+    const uint8_t quiet[] = {0U};
+    const int32_t zero[WIDTH] = {0, 0};
+    const hg_trigger_config c = {.width = WIDTH, .levels = 1U, .interval_max = 200U, .silence = quiet, .delta = none, .sigma = wide, .activity = zero, .zero = zero};
+    hg_trigger self;
+    int32_t codes[WIDTH];
+    for (size_t g = 0U; g < WIDTH; g++) {
+        const int32_t valid[WIDTH + 1U] = {HG_CODE_INVALID + 1, HG_CODE_INVALID + 1, HG_CODE_INVALID};
+        int32_t without[WIDTH + 1U] = {HG_CODE_INVALID + 1, HG_CODE_INVALID + 1, 0};
+        without[g] = HG_CODE_INVALID;
+        assert_status(HG_OK, hg_trigger_start(&self, &c, codes));
+        assert_status(HG_OK, hg_trigger_step(&self, valid));
+        assert_status(HG_E_EMPTY, hg_trigger_step(&self, valid));
+        assert_status(HG_OK, hg_trigger_step(&self, without));
+        assert_status(HG_E_EMPTY, hg_trigger_step(&self, without));
+        assert_status(HG_OK, hg_trigger_step(&self, valid));
+    }
+}
+
 static void a_bare_tick_is_periodic(void **state)
 {
     (void)state;
@@ -364,6 +388,7 @@ int main(void)
         cmocka_unit_test(the_first_step_sends_whatever_the_codes),
         cmocka_unit_test(a_deviation_equal_to_the_threshold_is_silent),
         cmocka_unit_test(becoming_or_ceasing_to_be_invalid_is_worth_a_frame),
+        cmocka_unit_test(validity_is_not_a_matter_of_distance),
         cmocka_unit_test(a_bare_tick_is_periodic),
         cmocka_unit_test(intervals_and_promises_hold_over_all_small_configurations),
         cmocka_unit_test(two_senders_do_not_know_of_each_other),

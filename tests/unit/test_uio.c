@@ -228,7 +228,8 @@ static void start_tells_null_and_bad_tables(void **state)
     assert_status(HG_E_ARGUMENT, hg_uio_start(&self, NULL, &ring, HG_START_REST, memory));
     assert_status(HG_E_ARGUMENT, hg_uio_start(&self, &usual, NULL, HG_START_REST, memory));
     assert_status(HG_E_ARGUMENT, hg_uio_start(&self, &usual, &ring, HG_START_REST, NULL));
-    hg_uio_config c[7];
+    const uint8_t outside_at_first[WIDTH] = {SIGNALS, 1U, 2U, 0U};
+    hg_uio_config c[8];
     for (size_t i = 0U; i < COUNT(c); i++) {
         c[i] = usual;
     }
@@ -241,6 +242,7 @@ static void start_tells_null_and_bad_tables(void **state)
     c[5].sensors = 1U + (uint8_t)(1U + ESTIMATES - N - 1U);
     c[5].unknown = 0U;
     c[6].observer.residuals = 1U;
+    c[7].observer.signal = outside_at_first;
     for (size_t i = 0U; i < COUNT(c); i++) {
         assert_false(hg_uio_valid(&c[i], SIGNALS, LENGTH));
         assert_status(HG_E_CONFIG, hg_uio_start(&self, &c[i], &ring, HG_START_REST, memory));
