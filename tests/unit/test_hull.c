@@ -430,7 +430,7 @@ static void modes_need_tables(void **state)
     hg_real memory[HG_HULL_REALS(OUT, MODES) + 1U];
     arm(memory, COUNT(memory));
     const hg_real growing[MODES] = {R(0), R(1)};
-    const hg_real negative[MODES] = {R(-0.5), R(0.5)};
+    const hg_real negative[MODES] = {R(0.5), R(-0.125)};
     const hg_real unknown[MODES] = {R(0.5), REAL_NAN};
     hg_hull_config c[8];
     for (size_t i = 0U; i < COUNT(c); i++) {
