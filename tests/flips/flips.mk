@@ -6,7 +6,7 @@ FLIPS_MODELS := platoon platoon_bank
 FLIPS_DEEP := $(FLIPS_MODELS) openacc suspension suspension_published two_state cubic_suspension quadratic_sensor battery_cell
 FLIPS_STRIDE := 7# of the sanitized run, in calls
 FLIPS_CC_plain = $(CC) $(OPTIMISE) -O3
-FLIPS_CC_asan = $(CC) $(SANITIZE),address
+FLIPS_CC_asan = $(CC) $(SANITIZE),address -fno-sanitize=bool,enum# of which other values than their own are what is tried here
 
 # $(call flips_program,BUILD,MODEL)
 define flips_program
