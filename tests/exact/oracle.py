@@ -85,6 +85,10 @@ class Reader:
     def J(self) -> Exact:
         return self._exact(self._d.J, self._t.residuals, self._t.width)
 
+    def closest(self, bank: int) -> int:
+        """The certificate that a bank speaks of."""
+        return int(self._d.memory.bank[bank].closest)
+
     def open(self) -> list[bool]:
         """Which thresholds are the largest number there is: no finite residual is above it, and what is not finite is refused."""
         return [self._q31 and J == 2**31 - 2 for J in self._ffi.unpack(self._d.J, self._t.residuals)]
@@ -296,16 +300,15 @@ class Run:
 
         for i, bank in enumerate(self._banks):
             place = self._native.tables.residuals - len(self._banks) + i
-            self._certified(f"sample {k}, bank {i + 1}", bank.judge(self._values, self._radii), r.fraction(place), J.fraction(place))
+            self._certified(f"sample {k}, bank {i + 1}", bank.judge(self._values, self._radii), self._read.closest(i), r.fraction(place), J.fraction(place))
 
-    def _certified(self, what: str, certificates: list[Judged], r: Fraction, J: Fraction) -> None:
-        """What the library says of a bank is what one of its certificates is, and its threshold is no smaller than that one's least."""
+    def _certified(self, what: str, certificates: list[Judged], closest: int, r: Fraction, J: Fraction) -> None:
+        """What the library says of a bank is what the certificate is that it calls closest, and its threshold is no smaller than that one's least."""
         if not certificates:
             return
-        off = [abs(c.r.fraction(0) - r) + max(c.J.fraction(0) - J, J - c.J.fraction(0)) for c in certificates]
-        found = certificates[int(np.argmin([float(x) for x in off]))]
+        found = certificates[closest]
         if abs(found.r.fraction(0) - r) > Fraction(found.rounding):
-            raise BrokenError(f"{what}: r = {float(r):.9g} is that of no certificate")
+            raise BrokenError(f"{what}: r = {float(r):.9g} is not that of certificate {closest + 1}, {float(found.r.fraction(0)):.9g}")
         if found.J.fraction(0) > J:
             raise BrokenError(f"{what}: J = {float(J):.9g} is less than the exact {float(found.J.fraction(0)):.9g}")
         if float(J - found.J.fraction(0)) > found.above:
