@@ -586,7 +586,7 @@ const hg_sender_config hg_battery_cell_sender[HG_BATTERY_CELL_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_battery_cell_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_battery_cell_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_battery_cell_config, HG_BATTERY_CELL_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_BATTERY_CELL_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

@@ -60,12 +60,13 @@ extern "C" {
 #define HG_BATTERY_PACK_HASH 0x922B7D5BUL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_Q31
-#define HG_BATTERY_PACK_DIGEST 0x298BBEC8UL
+#define HG_BATTERY_PACK_DIGEST 0x639E583AUL
 #elif HG_REAL_F64
-#define HG_BATTERY_PACK_DIGEST 0xD9D3F894UL
+#define HG_BATTERY_PACK_DIGEST 0xFFF5E9B0UL
 #elif HG_REAL_F32
-#define HG_BATTERY_PACK_DIGEST 0xDB599B43UL
+#define HG_BATTERY_PACK_DIGEST 0x340BB1BDUL
 #endif
+#define HG_BATTERY_PACK_DIGEST_HEAD 0x5AC09248UL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

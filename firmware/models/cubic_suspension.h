@@ -61,10 +61,11 @@ extern "C" {
 #define HG_CUBIC_SUSPENSION_HASH 0xB7ECF4EDUL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_F64
-#define HG_CUBIC_SUSPENSION_DIGEST 0x16A6B004UL
+#define HG_CUBIC_SUSPENSION_DIGEST 0xB70B142EUL
 #elif HG_REAL_F32
-#define HG_CUBIC_SUSPENSION_DIGEST 0xB26A23E6UL
+#define HG_CUBIC_SUSPENSION_DIGEST 0x188C00BCUL
 #endif
+#define HG_CUBIC_SUSPENSION_DIGEST_HEAD 0x8416D5A7UL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

@@ -1134,7 +1134,7 @@ const hg_sender_config hg_dc_motor_sender[HG_DC_MOTOR_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_dc_motor_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_dc_motor_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_dc_motor_config, HG_DC_MOTOR_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_DC_MOTOR_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

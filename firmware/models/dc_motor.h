@@ -63,12 +63,13 @@ extern "C" {
 #define HG_DC_MOTOR_HASH 0xAED7E82DUL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_Q31
-#define HG_DC_MOTOR_DIGEST 0x96A9E410UL
+#define HG_DC_MOTOR_DIGEST 0x0EEC8C48UL
 #elif HG_REAL_F64
-#define HG_DC_MOTOR_DIGEST 0x4204A459UL
+#define HG_DC_MOTOR_DIGEST 0x571139BAUL
 #elif HG_REAL_F32
-#define HG_DC_MOTOR_DIGEST 0xD83D149AUL
+#define HG_DC_MOTOR_DIGEST 0xB8EB41BCUL
 #endif
+#define HG_DC_MOTOR_DIGEST_HEAD 0xCB1A4F51UL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

@@ -475,7 +475,7 @@ const hg_tracker_config hg_fusion5_config = {
 #if HG_WITH_DIGEST
 hg_status hg_fusion5_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_tracker(walk, &hg_fusion5_config, numbers);
+    const hg_status result = hg_digest_tracker(walk, &hg_fusion5_config, HG_FUSION5_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_FUSION5_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

@@ -31,10 +31,11 @@ extern "C" {
 #define HG_FUSION5_HASH 0xC49B8CB2UL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_F64
-#define HG_FUSION5_DIGEST 0xC43AFECCUL
+#define HG_FUSION5_DIGEST 0x9C65A588UL
 #elif HG_REAL_F32
-#define HG_FUSION5_DIGEST 0x3A931FB8UL
+#define HG_FUSION5_DIGEST 0xE7D5C145UL
 #endif
+#define HG_FUSION5_DIGEST_HEAD 0xC464C775UL /* of it, how many tables there are */
 
 /* States. */
 enum {

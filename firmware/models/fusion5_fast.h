@@ -31,10 +31,11 @@ extern "C" {
 #define HG_FUSION5_FAST_HASH 0x0D28A507UL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_F64
-#define HG_FUSION5_FAST_DIGEST 0x01075657UL
+#define HG_FUSION5_FAST_DIGEST 0x8FD62506UL
 #elif HG_REAL_F32
-#define HG_FUSION5_FAST_DIGEST 0x456E999EUL
+#define HG_FUSION5_FAST_DIGEST 0xE648CD38UL
 #endif
+#define HG_FUSION5_FAST_DIGEST_HEAD 0x1C0BBC1DUL /* of it, how many tables there are */
 
 /* States. */
 enum {

@@ -3942,7 +3942,7 @@ const hg_sender_config hg_openacc_sender[HG_OPENACC_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_openacc_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_openacc_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_openacc_config, HG_OPENACC_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_OPENACC_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

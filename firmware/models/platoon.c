@@ -458,7 +458,7 @@ const hg_sender_config hg_platoon_sender[HG_PLATOON_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_platoon_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_platoon_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_platoon_config, HG_PLATOON_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_PLATOON_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

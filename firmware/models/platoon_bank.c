@@ -3584,7 +3584,7 @@ const hg_sender_config hg_platoon_bank_sender[HG_PLATOON_BANK_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_platoon_bank_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_platoon_bank_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_platoon_bank_config, HG_PLATOON_BANK_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_PLATOON_BANK_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

@@ -66,12 +66,13 @@ extern "C" {
 #define HG_PLATOON_BANK_HASH 0xFD7D6294UL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_Q31
-#define HG_PLATOON_BANK_DIGEST 0xB98395DAUL
+#define HG_PLATOON_BANK_DIGEST 0x3EC38B21UL
 #elif HG_REAL_F64
-#define HG_PLATOON_BANK_DIGEST 0xFEF67994UL
+#define HG_PLATOON_BANK_DIGEST 0x7766F453UL
 #elif HG_REAL_F32
-#define HG_PLATOON_BANK_DIGEST 0x7B503993UL
+#define HG_PLATOON_BANK_DIGEST 0x53BD8ED1UL
 #endif
+#define HG_PLATOON_BANK_DIGEST_HEAD 0xEC333DFAUL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

@@ -478,7 +478,7 @@ const hg_sender_config hg_quadratic_sensor_sender[HG_QUADRATIC_SENSOR_GROUPS] = 
 #if HG_WITH_DIGEST
 hg_status hg_quadratic_sensor_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_quadratic_sensor_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_quadratic_sensor_config, HG_QUADRATIC_SENSOR_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_QUADRATIC_SENSOR_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

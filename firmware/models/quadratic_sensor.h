@@ -61,10 +61,11 @@ extern "C" {
 #define HG_QUADRATIC_SENSOR_HASH 0x60F0968CUL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_F64
-#define HG_QUADRATIC_SENSOR_DIGEST 0xF7C4A141UL
+#define HG_QUADRATIC_SENSOR_DIGEST 0x2B7C1C7AUL
 #elif HG_REAL_F32
-#define HG_QUADRATIC_SENSOR_DIGEST 0x2B672976UL
+#define HG_QUADRATIC_SENSOR_DIGEST 0x595ACA19UL
 #endif
+#define HG_QUADRATIC_SENSOR_DIGEST_HEAD 0xB79A40B9UL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

@@ -1021,7 +1021,7 @@ const hg_sender_config hg_suspension_sender[HG_SUSPENSION_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_suspension_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_suspension_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_suspension_config, HG_SUSPENSION_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_SUSPENSION_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

@@ -63,12 +63,13 @@ extern "C" {
 #define HG_SUSPENSION_HASH 0x61D939B1UL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_Q31
-#define HG_SUSPENSION_DIGEST 0x70FF85A7UL
+#define HG_SUSPENSION_DIGEST 0x0C7A1B96UL
 #elif HG_REAL_F64
-#define HG_SUSPENSION_DIGEST 0xF2C7A24BUL
+#define HG_SUSPENSION_DIGEST 0x770DBDD4UL
 #elif HG_REAL_F32
-#define HG_SUSPENSION_DIGEST 0x27E390D8UL
+#define HG_SUSPENSION_DIGEST 0xF40CF505UL
 #endif
+#define HG_SUSPENSION_DIGEST_HEAD 0x7876EEFCUL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

@@ -61,12 +61,13 @@ extern "C" {
 #define HG_SUSPENSION_PUBLISHED_HASH 0xBFBA6462UL /* changes with any number of the tables */
 /* Digest of the tables, for each number type (digest.h). */
 #if HG_REAL_Q31
-#define HG_SUSPENSION_PUBLISHED_DIGEST 0xCE713B7EUL
+#define HG_SUSPENSION_PUBLISHED_DIGEST 0x86AE1712UL
 #elif HG_REAL_F64
-#define HG_SUSPENSION_PUBLISHED_DIGEST 0xED4E79E8UL
+#define HG_SUSPENSION_PUBLISHED_DIGEST 0xEFB7A36AUL
 #elif HG_REAL_F32
-#define HG_SUSPENSION_PUBLISHED_DIGEST 0x42C38D2AUL
+#define HG_SUSPENSION_PUBLISHED_DIGEST 0xF11CFEEBUL
 #endif
+#define HG_SUSPENSION_PUBLISHED_DIGEST_HEAD 0xDF4E575BUL /* of it, how many tables there are */
 
 /* Places in the signal vector, group after group. */
 enum {

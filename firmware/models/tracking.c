@@ -544,7 +544,7 @@ const hg_tracker_config hg_tracking_config = {
 #if HG_WITH_DIGEST
 hg_status hg_tracking_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_tracker(walk, &hg_tracking_config, numbers);
+    const hg_status result = hg_digest_tracker(walk, &hg_tracking_config, HG_TRACKING_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_TRACKING_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

@@ -484,7 +484,7 @@ const hg_sender_config hg_two_state_sender[HG_TWO_STATE_GROUPS] = {
 #if HG_WITH_DIGEST
 hg_status hg_two_state_check(hg_digest *walk, uint32_t numbers)
 {
-    const hg_status result = hg_digest_node(walk, &hg_two_state_config, numbers);
+    const hg_status result = hg_digest_node(walk, &hg_two_state_config, HG_TWO_STATE_DIGEST_HEAD, numbers);
     return ((result == HG_OK) && (walk->crc != HG_TWO_STATE_DIGEST)) ? HG_E_DIGEST : result;
 }
 #endif

@@ -21,9 +21,10 @@ hg_status hg_digest_close(const hg_digest *self)
     return (self->left > 0U) ? HG_OK : HG_E_BUSY;
 }
 
-/* Of a table of so many numbers this call takes those from the result up to *end - 1. */
-static uint32_t window(hg_digest *self, uint32_t count, uint32_t *end)
+/* Of a table of so many numbers this call takes those from the result up to *end - 1. A table that is not there has none, whatever a wrong number says. */
+static uint32_t window(hg_digest *self, bool there, uint32_t length, uint32_t *end)
 {
+    const uint32_t count = there ? length : 0U;
     const uint32_t first = (self->skip < count) ? self->skip : count;
     const uint32_t more = count - first;
     const uint32_t taken = (more < self->left) ? more : self->left;
@@ -42,7 +43,7 @@ void hg_digest_number(hg_digest *self, uint32_t x)
 void hg_digest_bytes(hg_digest *self, const uint8_t *x, uint32_t count)
 {
     uint32_t end;
-    for (uint32_t i = window(self, count, &end); i < end; i++) {
+    for (uint32_t i = window(self, x != NULL, count, &end); i < end; i++) {
         self->crc = hg_crc32c(self->crc, x[i], 1U);
     }
 }
@@ -50,7 +51,7 @@ void hg_digest_bytes(hg_digest *self, const uint8_t *x, uint32_t count)
 void hg_digest_halves(hg_digest *self, const uint16_t *x, uint32_t count)
 {
     uint32_t end;
-    for (uint32_t i = window(self, count, &end); i < end; i++) {
+    for (uint32_t i = window(self, x != NULL, count, &end); i < end; i++) {
         self->crc = hg_crc32c(self->crc, x[i], 2U);
     }
 }
@@ -58,7 +59,7 @@ void hg_digest_halves(hg_digest *self, const uint16_t *x, uint32_t count)
 void hg_digest_codes(hg_digest *self, const int32_t *x, uint32_t count)
 {
     uint32_t end;
-    for (uint32_t i = window(self, count, &end); i < end; i++) {
+    for (uint32_t i = window(self, x != NULL, count, &end); i < end; i++) {
         self->crc = hg_crc32c(self->crc, (uint32_t)x[i], 4U);
     }
 }
@@ -66,7 +67,7 @@ void hg_digest_codes(hg_digest *self, const int32_t *x, uint32_t count)
 void hg_digest_masks(hg_digest *self, const uint32_t *x, uint32_t count)
 {
     uint32_t end;
-    for (uint32_t i = window(self, count, &end); i < end; i++) {
+    for (uint32_t i = window(self, x != NULL, count, &end); i < end; i++) {
         self->crc = hg_crc32c(self->crc, x[i], 4U);
     }
 }
@@ -74,7 +75,7 @@ void hg_digest_masks(hg_digest *self, const uint32_t *x, uint32_t count)
 void hg_digest_reals(hg_digest *self, const hg_real *x, uint32_t count)
 {
     uint32_t end;
-    for (uint32_t i = window(self, count, &end); i < end; i++) {
+    for (uint32_t i = window(self, x != NULL, count, &end); i < end; i++) {
         self->crc = hg_crc32c_real(self->crc, x[i]);
     }
 }
@@ -113,7 +114,7 @@ static void e2e(hg_digest *self, const hg_e2e_config *config)
 
 static void scales(hg_digest *self, const hg_code_scale *scale, uint8_t width)
 {
-    for (uint8_t g = 0U; g < width; g++) {
+    for (uint8_t g = 0U; (scale != NULL) && (g < width); g++) {
         const hg_real real[] = {scale[g].resolution, scale[g].offset, scale[g].per_unit};
         const uint32_t number[] = {word(scale[g].exponent), (uint32_t)scale[g].minimum, (uint32_t)scale[g].maximum};
         hg_digest_reals(self, real, (uint32_t)(sizeof(real) / sizeof(real[0])));
@@ -126,7 +127,7 @@ void hg_digest_message(hg_digest *self, const hg_message *message)
     const uint32_t number[] = {message->id, message->flags, message->length, message->width, flag(message->idle != NULL)};
     hg_digest_masks(self, number, (uint32_t)(sizeof(number) / sizeof(number[0])));
     hg_digest_bytes(self, message->idle, (message->idle != NULL) ? message->length : 0U);
-    for (uint8_t g = 0U; g < message->width; g++) {
+    for (uint8_t g = 0U; (message->field != NULL) && (g < message->width); g++) {
         const uint16_t field[] = {message->field[g].start, message->field[g].length, message->field[g].flags};
         hg_digest_halves(self, field, (uint32_t)(sizeof(field) / sizeof(field[0])));
     }
@@ -282,12 +283,6 @@ static void bank(hg_digest *self, const hg_bank_config *config)
 
 static void detector(hg_digest *self, const hg_detector_config *config)
 {
-    const uint32_t number[] = {
-        config->signals,  config->width,  config->groups,    config->predictors, flag(config->mismatch != NULL), config->generators, flag((config->generators > 0U) && (config->hull != NULL)),
-        config->banks,    config->polynomials, config->history, config->window,  config->residuals,              config->codes,      config->reals,
-        config->sums,     config->decision.generators, config->decision.up, config->decision.down, flag(config->decision.latch),
-    };
-    hg_digest_masks(self, number, (uint32_t)(sizeof(number) / sizeof(number[0])));
     for (uint8_t i = 0U; i < config->groups; i++) {
         hold(self, &config->hold[i]);
     }
@@ -328,11 +323,31 @@ static void freeze(hg_digest *self, const hg_freeze_config *config)
     hg_digest_message(self, config->response);
 }
 
-hg_status hg_digest_node(hg_digest *self, const hg_node_config *config, uint32_t numbers)
+uint32_t hg_digest_node_head(const hg_node_config *config)
 {
-    const uint32_t number[] = {config->closing, config->heartbeat, config->model_hash, flag(config->freeze != NULL)};
+    const hg_detector_config *detector = config->detector;
+    const bool hulls = (detector->generators > 0U) && (detector->hull != NULL);
+    const uint32_t number[] = {
+        config->closing, config->heartbeat, config->model_hash, flag(config->freeze != NULL),
+        detector->signals, detector->width, detector->groups, detector->predictors, flag(detector->mismatch != NULL),
+        detector->generators, flag(hulls), detector->banks, detector->polynomials, detector->history, detector->window,
+        detector->residuals, detector->codes, detector->reals, detector->sums,
+        detector->decision.generators, detector->decision.up, detector->decision.down, flag(detector->decision.latch),
+    };
+    uint32_t crc = 0U;
+    for (uint8_t i = 0U; i < (uint8_t)(sizeof(number) / sizeof(number[0])); i++) {
+        crc = hg_crc32c(crc, number[i], 4U);
+    }
+    return crc;
+}
+
+hg_status hg_digest_node(hg_digest *self, const hg_node_config *config, uint32_t head, uint32_t numbers)
+{
+    if (hg_digest_node_head(config) != head) {
+        return HG_E_DIGEST; /* before any pointer is followed that may not be there */
+    }
     hg_digest_open(self, numbers);
-    hg_digest_masks(self, number, (uint32_t)(sizeof(number) / sizeof(number[0])));
+    hg_digest_number(self, head);
     for (uint8_t i = 0U; i < config->detector->groups; i++) {
         hg_digest_message(self, &config->message[i]);
     }

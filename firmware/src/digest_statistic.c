@@ -10,7 +10,7 @@ static uint32_t when(bool there, uint32_t count)
 
 static void map(hg_digest *self, const hg_polynomial_map *map, uint8_t rows)
 {
-    const uint32_t terms = map->end[rows - 1U];
+    const uint32_t terms = (rows > 0U) ? map->end[rows - 1U] : 0U;
     hg_digest_number(self, map->width);
     hg_digest_halves(self, map->end, rows);
     hg_digest_reals(self, map->coefficient, terms);

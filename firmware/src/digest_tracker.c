@@ -1,20 +1,17 @@
 #include "hullguard/digest_tracker.h"
 
+#include "hullguard/crc32c.h"
+
 #include <stddef.h>
 
 #if !HG_REAL_Q31
 
 static void fusion(hg_digest *self, const hg_fusion_config *config)
 {
-    const uint32_t number[] = {
-        config->states,  config->inputs,          config->sensors, config->depth,  config->delay,                  config->heartbeat, config->watchdog,
-        config->modulus, (uint32_t)config->trigger, config->rates, config->tables, (config->select != NULL) ? 1U : 0U, (config->origin != NULL) ? 1U : 0U,
-    };
     const hg_real real[] = {config->huber, config->rate_step, config->loss, config->smoothing};
     const uint32_t n = config->states;
     const uint32_t m = config->sensors;
     const uint32_t early = (config->delay > 0U) ? config->rates : 0U; /* else not there */
-    hg_digest_masks(self, number, (uint32_t)(sizeof(number) / sizeof(number[0])));
     hg_digest_reals(self, real, (uint32_t)(sizeof(real) / sizeof(real[0])));
     hg_digest_reals(self, config->A, n * n);
     hg_digest_reals(self, config->B, n * config->inputs);
@@ -45,11 +42,28 @@ static void consistency(hg_digest *self, const hg_consistency_config *config, ui
     hg_digest_reals(self, &config->limit, 1U);
 }
 
-hg_status hg_digest_tracker(hg_digest *self, const hg_tracker_config *config, uint32_t numbers)
+uint32_t hg_digest_tracker_head(const hg_tracker_config *config)
 {
-    const uint32_t number[] = {config->heartbeat, config->interval, config->model_hash, (config->consistency != NULL) ? 1U : 0U};
+    const hg_fusion_config *fusion = config->fusion;
+    const uint32_t number[] = {
+        config->heartbeat, config->interval, config->model_hash, (config->consistency != NULL) ? 1U : 0U,
+        fusion->states, fusion->inputs, fusion->sensors, fusion->depth, fusion->delay, fusion->heartbeat, fusion->watchdog, fusion->modulus,
+        (uint32_t)fusion->trigger, fusion->rates, fusion->tables, (fusion->select != NULL) ? 1U : 0U, (fusion->origin != NULL) ? 1U : 0U,
+    };
+    uint32_t crc = 0U;
+    for (uint8_t i = 0U; i < (uint8_t)(sizeof(number) / sizeof(number[0])); i++) {
+        crc = hg_crc32c(crc, number[i], 4U);
+    }
+    return crc;
+}
+
+hg_status hg_digest_tracker(hg_digest *self, const hg_tracker_config *config, uint32_t head, uint32_t numbers)
+{
+    if (hg_digest_tracker_head(config) != head) {
+        return HG_E_DIGEST; /* before any pointer is followed that may not be there */
+    }
     hg_digest_open(self, numbers);
-    hg_digest_masks(self, number, (uint32_t)(sizeof(number) / sizeof(number[0])));
+    hg_digest_number(self, head);
     fusion(self, config->fusion);
     if (config->consistency != NULL) {
         consistency(self, config->consistency, config->fusion->sensors);

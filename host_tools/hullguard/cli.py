@@ -16,7 +16,7 @@ STATUS = """exit status: 0 done; 1 the run failed or --expect was not met; 2 bad
 
 FREEZE = """a model may have its ECU keep the samples around a confirmed alarm, to be read with `hullguard freeze`:
   [freeze]
-  samples = 16                 kept, 1 .. 255; 0 (default): none. RAM of a sample: 16 to 20 bytes, and 2 numbers a signal and residual
+  samples = 16                 kept, 1 .. 255; 0 (default): none. RAM: of each 12 to 20 bytes, and 2 numbers a signal and residual
   after = 4                    of them after the alarm's, 0 .. samples - 1 (default: a quarter)
   frames_per_sample = 4        that an answer may send at most, 1 .. 255
   request = { id = 0x140 }     a frame of the detector's own, classic CAN, 8 bytes

@@ -116,6 +116,14 @@ static void a_walk_may_be_cut_anywhere(void **state)
     }
 }
 
+static uint32_t digest_of(const hg_node_config *config)
+{
+    hg_digest walk;
+    hg_digest_start(&walk);
+    assert_status(HG_OK, hg_digest_node(&walk, config, hg_digest_node_head(config), UINT32_MAX));
+    return walk.crc;
+}
+
 static void a_wrong_number_is_no_digest(void **state)
 {
     (void)state;
@@ -123,11 +131,30 @@ static void a_wrong_number_is_no_digest(void **state)
     config.heartbeat++;
     hg_digest walk;
     hg_digest_start(&walk);
-    assert_status(HG_OK, hg_digest_node(&walk, &config, UINT32_MAX));
-    assert_true(walk.crc != HG_PLATOON_DIGEST);
+    assert_status(HG_E_DIGEST, hg_digest_node(&walk, &config, HG_PLATOON_DIGEST_HEAD, UINT32_MAX));
+    assert_count(0, walk.done);
+    assert_true(digest_of(&config) != HG_PLATOON_DIGEST);
     walk.crc ^= 1U; /* as a wrong bit before leaves it */
-    walk.done--;
     assert_status(HG_E_DIGEST, hg_platoon_check(&walk, UINT32_MAX));
+}
+
+static void a_table_that_is_not_there_has_no_numbers(void **state)
+{
+    (void)state;
+    hg_digest walk;
+    hg_digest_start(&walk);
+    hg_digest_open(&walk, UINT32_MAX);
+    hg_digest_bytes(&walk, NULL, 3U);
+    hg_digest_halves(&walk, NULL, 3U);
+    hg_digest_codes(&walk, NULL, 3U);
+    hg_digest_masks(&walk, NULL, 3U);
+    hg_digest_reals(&walk, NULL, 3U);
+    assert_count(0, walk.done);
+    const hg_node_config *config = &hg_platoon_config;
+    hg_message message = *config->verdict; /* without fields, and a width that is wrong */
+    message.width = 2U;
+    hg_digest_message(&walk, &message);
+    assert_true(walk.done > 0U);
 }
 
 /* ---- every bit of what no shipped model has ---- */
@@ -138,14 +165,6 @@ typedef struct {
 } table;
 
 #define TABLE(x) {(x), sizeof(x)}
-
-static uint32_t digest_of(const hg_node_config *config)
-{
-    hg_digest walk;
-    hg_digest_start(&walk);
-    assert_status(HG_OK, hg_digest_node(&walk, config, UINT32_MAX));
-    return walk.crc;
-}
 
 static void every_bit_counts(const hg_node_config *config, const table *tables, size_t count)
 {
@@ -264,6 +283,8 @@ static void filters_that_keep_the_remainder(void **state)
     const uint32_t good = digest_of(&config);
     numbers[21] = R(3); /* not there without a bound */
     assert_true(digest_of(&config) == good);
+    statistic.filter.states = 0U; /* a wrong number: nothing before the tables is read */
+    assert_true(digest_of(&config) != good);
 }
 
 static void the_same_of_a_fusion_filter(void **state)
@@ -276,9 +297,10 @@ static void the_same_of_a_fusion_filter(void **state)
     static const hg_real dense[HG_FUSION_STATES_MAX * HG_FUSION_SENSORS_MAX];
     config.fusion = &fusion;
     hg_digest_start(&walk);
-    assert_status(HG_E_BUSY, hg_digest_tracker(&walk, &config, 5U));
-    assert_status(HG_OK, hg_digest_tracker(&walk, &config, UINT32_MAX));
+    assert_status(HG_E_BUSY, hg_digest_tracker(&walk, &config, HG_TRACKING_DIGEST_HEAD, 5U));
+    assert_status(HG_OK, hg_digest_tracker(&walk, &config, HG_TRACKING_DIGEST_HEAD, UINT32_MAX));
     assert_true(walk.crc == HG_TRACKING_DIGEST);
+    assert_status(HG_E_DIGEST, hg_digest_tracker(&walk, &config, HG_TRACKING_DIGEST_HEAD + 1U, UINT32_MAX));
     /* And with what it has not: rows in place of a selection, a local origin, no frames on their way, nobody who judges. */
     fusion.delay = 0U;
     fusion.origin = row;
@@ -286,11 +308,11 @@ static void the_same_of_a_fusion_filter(void **state)
     fusion.C = dense;
     config.consistency = NULL;
     hg_digest_start(&walk);
-    assert_status(HG_OK, hg_digest_tracker(&walk, &config, UINT32_MAX));
+    assert_status(HG_OK, hg_digest_tracker(&walk, &config, hg_digest_tracker_head(&config), UINT32_MAX));
     const uint32_t with = walk.crc;
     fusion.origin = NULL;
     hg_digest_start(&walk);
-    assert_status(HG_OK, hg_digest_tracker(&walk, &config, UINT32_MAX));
+    assert_status(HG_OK, hg_digest_tracker(&walk, &config, hg_digest_tracker_head(&config), UINT32_MAX));
     assert_true(walk.crc != with);
 }
 
@@ -302,6 +324,7 @@ int main(void)
         cmocka_unit_test(generated_files_know_the_digest_of_their_tables),
         cmocka_unit_test(a_walk_may_be_cut_anywhere),
         cmocka_unit_test(a_wrong_number_is_no_digest),
+        cmocka_unit_test(a_table_that_is_not_there_has_no_numbers),
         cmocka_unit_test(frames_predictions_and_uncertainties),
         cmocka_unit_test(zonotopes),
         cmocka_unit_test(filters_that_keep_the_remainder),

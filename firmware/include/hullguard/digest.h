@@ -10,10 +10,11 @@
  *      hg_digest_start(&walk);
  *      every sample:    switch (NAME_check(&walk, 64U)) { HG_E_BUSY: go on   HG_OK: all good, start again   HG_E_DIGEST: stop using verdicts }
  *
- *  The checksum is CRC-32C (crc32c.h), whose promises hold where the numbers of one walk stand beside one another. A wrong bit in a number that says how
- *  many others there are changes what is taken: the digest then differs but for a chance of one in 2^32 (tests/host/test_digest.py flips every bit of a
- *  model), and the walk may read behind a table before it can tell, up to the size that the wrong number says; a wrong pointer may lead anywhere. On
- *  a processor that traps there the trap is what shows the fault. Code is not looked at.
+ *  The checksum is CRC-32C (crc32c.h), whose promises hold for the numbers of a walk, one behind another. A wrong bit in a number that says how long a
+ *  table is changes what is taken: the digest then differs but for a chance of one in 2^32 (tests/host/test_trust.py flips every bit of a model), and the walk
+ *  may read behind that table before it can tell, as far as the wrong number says. How many tables there are is looked at first (head), so that a
+ *  wrong number leads to no pointer that is not there; a pointer that is wrong itself may lead anywhere. On a processor that traps there the trap is
+ *  what shows the fault. Code is not looked at.
  *  Not reentrant per instance; safe in interrupt context. */
 #ifndef HULLGUARD_DIGEST_H
 #define HULLGUARD_DIGEST_H
@@ -34,12 +35,17 @@ typedef struct {       /* RAM: one a walk */
 /** Begin a walk. */
 void hg_digest_start(hg_digest *self);
 
+/** CRC-32C of the numbers that say how many tables there are, which of the optional ones, and how large a node's memory is. */
+uint32_t hg_digest_node_head(const hg_node_config *config);
+
 /** Take the next numbers of a detector node's tables.
+ *  @param[in] head     what hg_digest_node_head() must find (HG_NAME_DIGEST_HEAD): only then is anything else followed
  *  @param[in] numbers  how many, >= 1; UINT32_MAX: all
- *  @retval HG_OK      that was the last one: self->crc is the digest; hg_digest_start() before the next walk
- *  @retval HG_E_BUSY  there are more
+ *  @retval HG_OK        that was the last one: self->crc is the digest; hg_digest_start() before the next walk
+ *  @retval HG_E_BUSY    there are more
+ *  @retval HG_E_DIGEST  the head is another; nothing was taken
  *  Cost: a few operations a table of the model, and of each row of a table of scales or fields, and 4 to 8 table look-ups a number. */
-hg_status hg_digest_node(hg_digest *self, const hg_node_config *config, uint32_t numbers);
+hg_status hg_digest_node(hg_digest *self, const hg_node_config *config, uint32_t head, uint32_t numbers);
 
 /* ---- Parts of a walk: what this one, digest_tracker.h and digest_uio.h are made of ---- */
 

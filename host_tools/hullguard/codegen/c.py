@@ -16,7 +16,7 @@ import numpy as np
 from hullguard.codegen.both import Both, Scaled, both
 from hullguard.codegen.names import Names, names_of, unit_of
 from hullguard.codegen.statistic import statistic_configs, statistic_tables
-from hullguard.codegen.trust import by_type, check, check_about, checked, freeze_config, freeze_storage, selftest, selftest_about
+from hullguard.codegen.trust import by_type, check, check_about, checked, freeze_config, freeze_storage, head, selftest, selftest_about
 from hullguard.core import trust
 from hullguard.design.bank_types import BankTable
 from hullguard.design.design import Design
@@ -325,6 +325,7 @@ def _header(design: Design, names: Names) -> str:
         f"#define {prefix}_SAMPLE_TIME_US {sample_us}UL /* microseconds between two closing frames */",
         f"#define {prefix}_HASH 0x{tables.hash:08X}UL /* changes with any number of the tables */",
         *by_type(f"{prefix}_DIGEST", trust.node_digests(tables), "Digest of the tables, for each number type (digest.h)."),
+        *head(f"{prefix}_DIGEST", trust.node_head(trust.natives(tables)["f32"])),
         "",
         *_enum(f"{prefix}_", "Places in the signal vector, group after group.", names.signals, spans),
         *_enum(f"{prefix}_GROUP_", "Groups: one sender and one frame each.", names.groups, kinds),
@@ -354,7 +355,7 @@ def _header(design: Design, names: Names) -> str:
 
 def _distinct(model: str, names: Names) -> None:
     """Refuse a signal whose constant would be another constant of the header."""
-    taken = {"SIGNALS", "GROUPS", "FAULTS", "SAMPLE_TIME_US", "HASH", "SIGNAL_NAMES", "GROUP_NAMES", "FAULT_NAMES", "UNITS", "DIGEST"}
+    taken = {"SIGNALS", "GROUPS", "FAULTS", "SAMPLE_TIME_US", "HASH", "SIGNAL_NAMES", "GROUP_NAMES", "FAULT_NAMES", "UNITS", "DIGEST", "DIGEST_HEAD"}
     taken |= {f"GROUP_{n.upper()}" for n in names.groups} | {f"FAULT_{n.upper()}" for n in names.faults}
     for n in names.signals:
         if n.upper() in taken:
@@ -734,7 +735,7 @@ def _starts(tables: Tables) -> list[str]:
     filters = " .polynomial = self->polynomial," if tables.polynomials else ""
     return [
         "#if HG_WITH_DIGEST",
-        *check(f"{t}_check", f"hg_digest_node(walk, &{t}_config, numbers)", f"{prefix}_DIGEST")[:-1],
+        *check(f"{t}_check", f"hg_digest_node(walk, &{t}_config, {prefix}_DIGEST_HEAD, numbers)", f"{prefix}_DIGEST")[:-1],
         "#endif",
         "",
         f"hg_status {t}_node_start({t}_node *self, hg_start how)",

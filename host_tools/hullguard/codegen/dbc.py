@@ -20,6 +20,7 @@ from hullguard.errors import InputError
 
 NAME_MAX = 32  # characters of a symbol in a DBC
 DETECTOR = "detector"
+TESTER = "tester"
 NOBODY = "Vector__XXX"
 SEND_TYPES = ("Cyclic", "Event", "NoMsgSendType")
 FRAME_FORMATS = ("StandardCAN", "ExtendedCAN", *(f"reserved{i}" for i in range(2, 14)), "StandardCAN_FD", "ExtendedCAN_FD")
@@ -223,12 +224,33 @@ def _status(design: Design, senders: tuple[str, ...]) -> Message:
     )
 
 
+def _freeze(design: Design) -> tuple[Message, ...]:
+    """Requests for the freeze frame, and what answers them (hullguard/freeze.h)."""
+    table = design.tables.freeze
+    if table is None:
+        return ()
+    asked = (
+        Entry("command", 16, 8, high=255, values={1: "state", 2: "read", 3: "clear"}, about="What is asked for"),
+        Entry("record", 24, 8, high=255, about="Number of the record that is read or cleared"),
+        Entry("first_word", 32, 16, high=2**16 - 1, about="Place of the first word that is read"),
+        Entry("words", 48, 16, high=2**16 - 1, about="How many words, 0: to the last"),
+    )
+    told = (
+        Entry("place", 16, 16, high=2**16 - 1, about="Of the word; 65535: the state"),
+        Entry("word", 32, 32, high=2**32 - 1, about="Of the record; or state in bits 1:0, alarms not recorded in 7:2, record in 15:8, words in 31:16"),
+    )
+    stamp = "Low 4 bits of the sample index; of a request it is not looked at"
+    request = Message(table.request, table.request.name, TESTER, (DETECTOR,), (*_header(table.request.protection, stamp), *asked), "Event", 0, "Asks for the freeze frame.")
+    about = "Answers a request for the freeze frame, a few words a sample."
+    return request, Message(table.response, table.response.name, DETECTOR, (TESTER,), (*_header(table.response.protection, stamp), *told), "Event", 0, about)
+
+
 def messages_of(design: Design) -> tuple[Message, ...]:
-    """All frames of a model: the groups', the verdict, the status."""
+    """All frames of a model: the groups', the verdict, the status, those of the freeze frame."""
     names = names_of(design)
     senders = tuple(_sender(n) for n in names.groups)
     groups = tuple(_group(design, i, names) for i in range(len(names.groups)))
-    made = (*groups, _verdict(design, names, senders), _status(design, senders))
+    made = (*groups, _verdict(design, names, senders), _status(design, senders), *_freeze(design))
     for m in made:
         taken = [e.name for e in m.entries]
         twice = sorted({n for n in taken if taken.count(n) > 1})

@@ -8,8 +8,10 @@ from pathlib import Path
 from hullguard.codegen.c import _field, _message, _protection, _scale, _strings, banner, comment, present, real, reals, table, unsigned
 from hullguard.codegen.dbc import BASIS, BUS, DETECTOR, FAULT, FLAG, PLANT, Entry, Message, _entry, _header, _numbered, _symbol, dbc_text
 from hullguard.codegen.names import LIBRARY, UNITS, identifiers
-from hullguard.codegen.trust import by_type, check, check_about, checked
+from hullguard.codegen.trust import by_type, check, check_about, checked, head
 from hullguard.core import trust
+from hullguard.core.library import library
+from hullguard.core.tracker import TrackerNative
 from hullguard.design.fusion_model import EstimateTable, FusionDesign, FusionTables, SourceTable
 from hullguard.design.tables import SignalTable
 from hullguard.errors import InputError
@@ -79,6 +81,7 @@ def _c_header(made: FusionDesign) -> str:
         f"#define {macro}_SAMPLE_TIME_US {round(model.sample_time_s * 1e6)}UL /* microseconds between two ticks */",
         f"#define {macro}_HASH 0x{t.hash:08X}UL /* changes with any number of the tables */",
         *by_type(f"{macro}_DIGEST", trust.tracker_digests(t), "Digest of the tables, for each number type (digest.h)."),
+        *head(f"{macro}_DIGEST", trust.tracker_head(TrackerNative(library(), t))),
         "",
         *_places(f"{macro}_STATE_", "States.", model.plant.states, [unit_of(s) or "no unit" for s in model.plant.states]),
         *_places(f"{macro}_SENSOR_", "Sensors: bits of a verdict's candidates.", model.names, frames),
@@ -225,7 +228,7 @@ def _c_source(made: FusionDesign) -> str:
         "};",
         "",
         "#if HG_WITH_DIGEST",
-        *check(f"{prefix}_check", f"hg_digest_tracker(walk, &{prefix}_config, numbers)", f"HG_{t.name.upper()}_DIGEST")[:-1],
+        *check(f"{prefix}_check", f"hg_digest_tracker(walk, &{prefix}_config, HG_{t.name.upper()}_DIGEST_HEAD, numbers)", f"HG_{t.name.upper()}_DIGEST")[:-1],
         "#endif",
         "",
         f"hg_status {prefix}_tracker_start({prefix}_tracker *self, hg_start how)",

@@ -22,6 +22,11 @@ def by_type(macro: str, digests: Mapping[str, int], about: str) -> list[str]:
     return [*lines, "#endif"]
 
 
+def head(macro: str, crc: int) -> list[str]:
+    """The same for every number type: it holds no number of a table."""
+    return [f"#define {macro}_HEAD 0x{crc:08X}UL /* of it, how many tables there are */"]
+
+
 def check_about(what: str) -> list[str]:
     """Comment of NAME_check()."""
     return [

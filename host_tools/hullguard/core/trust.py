@@ -40,16 +40,26 @@ def _begun(made: Library) -> Any:
     return walk
 
 
+def node_head(native: Native) -> int:
+    """Of the numbers that say how many tables a detector node has."""
+    return int(native.library.lib.hg_digest_node_head(native.node))
+
+
+def tracker_head(native: TrackerNative) -> int:
+    """The same of a fusion filter."""
+    return int(native.library.lib.hg_digest_tracker_head(native.config))
+
+
 def node_digest(native: Native) -> int:
     """Of a detector node's tables."""
     walk = _begun(native.library)
-    return _walked(native.library, walk, native.library.lib.hg_digest_node(walk, native.node, ALL))
+    return _walked(native.library, walk, native.library.lib.hg_digest_node(walk, native.node, node_head(native), ALL))
 
 
 def tracker_digest(native: TrackerNative) -> int:
     """Of a fusion filter's tables."""
     walk = _begun(native.library)
-    return _walked(native.library, walk, native.library.lib.hg_digest_tracker(walk, native.config, ALL))
+    return _walked(native.library, walk, native.library.lib.hg_digest_tracker(walk, native.config, tracker_head(native), ALL))
 
 
 def _exact(table: Any) -> Any:
