@@ -119,7 +119,8 @@ typedef struct {
 } hg_suspension_published_node;
 
 #if HG_WITH_DIGEST
-/** Take the next numbers of the model's tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+/** Take the next numbers of the model's tables and compare their digest (digest.h): for a walk in the background.
+ *  The start does it at once.
  *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
  *  @retval HG_OK        that was the last one, and all is as generated
  *  @retval HG_E_BUSY    there are more
@@ -127,8 +128,8 @@ typedef struct {
 hg_status hg_suspension_published_check(hg_digest *walk, uint32_t numbers);
 #endif
 
-/** Self-test of tables, library and processor (selftest.h) in the node's own memory, before its start: a stored drive, fault-free and then with a fault
- *  that must be found, every bit of whose outcome was computed when the model was designed.
+/** Self-test of tables, library and processor (selftest.h) in the node's own memory, before its start: a stored drive,
+ *  fault-free and then with a fault that must be found, every bit of whose outcome was computed when the model was designed.
  *  @param[out] self  memory, owned by the caller; not started afterwards
  *  @retval HG_OK          all as it was then
  *  @retval HG_E_SELFTEST  something is not

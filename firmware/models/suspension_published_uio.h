@@ -50,7 +50,8 @@ typedef struct {
 } hg_suspension_published_uio;
 
 #if HG_WITH_DIGEST
-/** Take the next numbers of the observers' tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+/** Take the next numbers of the observers' tables and compare their digest (digest.h): for a walk in the background.
+ *  The start does it at once.
  *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
  *  @retval HG_OK        that was the last one, and all is as generated
  *  @retval HG_E_BUSY    there are more

@@ -74,14 +74,16 @@ typedef struct {
 } hg_suspension_uio;
 
 #if HG_WITH_DIGEST
-/** Take the next numbers of the observers' tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+/** Take the next numbers of the observers' tables and compare their digest (digest.h): for a walk in the background.
+ *  The start does it at once.
  *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
  *  @retval HG_OK        that was the last one, and all is as generated
  *  @retval HG_E_BUSY    there are more
  *  @retval HG_E_DIGEST  that was the last one, and something is not */
 hg_status hg_suspension_uio_check(hg_digest *walk, uint32_t numbers);
 #if !HG_REAL_Q31
-/** Take the next numbers of the tables of what tells causes apart and compare their digest (digest.h), for a walk in the background; the start does it at once.
+/** Take the next numbers of the tables of what tells causes apart and compare their digest (digest.h): for a walk in the background.
+ *  The start does it at once.
  *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
  *  @retval HG_OK        that was the last one, and all is as generated
  *  @retval HG_E_BUSY    there are more

@@ -82,7 +82,8 @@ typedef struct {
 } hg_tracking_tracker;
 
 #if HG_WITH_DIGEST
-/** Take the next numbers of the model's tables and compare their digest (digest.h), for a walk in the background; the start does it at once.
+/** Take the next numbers of the model's tables and compare their digest (digest.h): for a walk in the background.
+ *  The start does it at once.
  *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1
  *  @retval HG_OK        that was the last one, and all is as generated
  *  @retval HG_E_BUSY    there are more

@@ -325,14 +325,14 @@ static void freeze(hg_digest *self, const hg_freeze_config *config)
 
 uint32_t hg_digest_node_head(const hg_node_config *config)
 {
-    const hg_detector_config *detector = config->detector;
-    const bool hulls = (detector->generators > 0U) && (detector->hull != NULL);
+    const hg_detector_config *d = config->detector;
+    const bool hulls = (d->generators > 0U) && (d->hull != NULL);
     const uint32_t number[] = {
         config->closing, config->heartbeat, config->model_hash, flag(config->freeze != NULL),
-        detector->signals, detector->width, detector->groups, detector->predictors, flag(detector->mismatch != NULL),
-        detector->generators, flag(hulls), detector->banks, detector->polynomials, detector->history, detector->window,
-        detector->residuals, detector->codes, detector->reals, detector->sums,
-        detector->decision.generators, detector->decision.up, detector->decision.down, flag(detector->decision.latch),
+        d->signals, d->width, d->groups, d->predictors, flag(d->mismatch != NULL),
+        d->generators, flag(hulls), d->banks, d->polynomials, d->history, d->window,
+        d->residuals, d->codes, d->reals, d->sums,
+        d->decision.generators, d->decision.up, d->decision.down, flag(d->decision.latch),
     };
     uint32_t crc = 0U;
     for (uint8_t i = 0U; i < (uint8_t)(sizeof(number) / sizeof(number[0])); i++) {

@@ -44,11 +44,11 @@ static void consistency(hg_digest *self, const hg_consistency_config *config, ui
 
 uint32_t hg_digest_tracker_head(const hg_tracker_config *config)
 {
-    const hg_fusion_config *fusion = config->fusion;
+    const hg_fusion_config *f = config->fusion;
     const uint32_t number[] = {
         config->heartbeat, config->interval, config->model_hash, (config->consistency != NULL) ? 1U : 0U,
-        fusion->states, fusion->inputs, fusion->sensors, fusion->depth, fusion->delay, fusion->heartbeat, fusion->watchdog, fusion->modulus,
-        (uint32_t)fusion->trigger, fusion->rates, fusion->tables, (fusion->select != NULL) ? 1U : 0U, (fusion->origin != NULL) ? 1U : 0U,
+        f->states, f->inputs, f->sensors, f->depth, f->delay, f->heartbeat, f->watchdog, f->modulus,
+        (uint32_t)f->trigger, f->rates, f->tables, (f->select != NULL) ? 1U : 0U, (f->origin != NULL) ? 1U : 0U,
     };
     uint32_t crc = 0U;
     for (uint8_t i = 0U; i < (uint8_t)(sizeof(number) / sizeof(number[0])); i++) {

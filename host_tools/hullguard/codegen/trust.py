@@ -30,7 +30,8 @@ def head(macro: str, crc: int) -> list[str]:
 def check_about(what: str) -> list[str]:
     """Comment of NAME_check()."""
     return [
-        f"/** Take the next numbers of {what} and compare their digest (digest.h), for a walk in the background; the start does it at once.",
+        f"/** Take the next numbers of {what} and compare their digest (digest.h): for a walk in the background.",
+        " *  The start does it at once.",
         " *  @param[in,out] walk  begun by hg_digest_start()  @param[in] numbers  how many, >= 1",
         " *  @retval HG_OK        that was the last one, and all is as generated",
         " *  @retval HG_E_BUSY    there are more",
@@ -86,8 +87,8 @@ def freeze_config(f: FreezeTable | None) -> list[str]:
 def selftest_about(t: str) -> list[str]:
     """Prototype of NAME_selftest()."""
     return [
-        "/** Self-test of tables, library and processor (selftest.h) in the node's own memory, before its start: a stored drive, fault-free and then with a fault",
-        " *  that must be found, every bit of whose outcome was computed when the model was designed.",
+        "/** Self-test of tables, library and processor (selftest.h) in the node's own memory, before its start: a stored drive,",
+        " *  fault-free and then with a fault that must be found, every bit of whose outcome was computed when the model was designed.",
         " *  @param[out] self  memory, owned by the caller; not started afterwards",
         " *  @retval HG_OK          all as it was then",
         " *  @retval HG_E_SELFTEST  something is not",
