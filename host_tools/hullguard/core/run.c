@@ -60,6 +60,13 @@ static hg_node_memory node_memory(arena *a, const hg_node_config *node)
     m.detector.sum = take(a, m.detector.sums, sizeof(hg_acc));
     m.link = take(a, d->groups, sizeof(hg_link));
     m.closing = take(a, (size_t)node->message[node->closing].width + 1U, sizeof(int32_t));
+    m.freeze = NULL;
+    m.frozen = (hg_freeze_memory){0};
+    if (node->freeze != NULL) {
+        m.freeze = take(a, 1U, sizeof(hg_freeze));
+        m.frozen.row = take(a, node->freeze->samples, sizeof(hg_freeze_row));
+        m.frozen.real = take(a, (size_t)node->freeze->samples * 2U * ((size_t)d->width + d->residuals), sizeof(hg_real));
+    }
     return m;
 }
 
