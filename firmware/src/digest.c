@@ -170,7 +170,7 @@ static void matrix(hg_digest *self, const hg_matrix *m)
     hg_digest_reals(self, m->data, (uint32_t)m->rows * m->cols);
 }
 
-static void predict(hg_digest *self, const hg_predict_config *config)
+static void predictor(hg_digest *self, const hg_predict_config *config)
 {
     const uint32_t number[] = {config->group, config->first, config->order, config->width, config->inputs, config->horizon, config->settle};
     hg_digest_masks(self, number, (uint32_t)(sizeof(number) / sizeof(number[0])));
@@ -287,7 +287,7 @@ static void detector(hg_digest *self, const hg_detector_config *config)
         hold(self, &config->hold[i]);
     }
     for (uint8_t i = 0U; (HG_WITH_PREDICT != 0) && (i < config->predictors); i++) {
-        predict(self, &config->predict[i]);
+        predictor(self, &config->predict[i]);
     }
     if ((HG_WITH_MISMATCH != 0) && (config->mismatch != NULL)) {
         mismatch(self, config->mismatch);

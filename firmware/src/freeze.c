@@ -65,7 +65,7 @@ hg_status hg_freeze_start(hg_freeze *self, const hg_freeze_config *config, const
 
 /* ---- recording ---- */
 
-static void copy(hg_real *to, const hg_real *from, uint32_t count)
+static void put(hg_real *to, const hg_real *from, uint32_t count)
 {
     for (uint32_t i = 0U; i < count; i++) {
         to[i] = from[i];
@@ -82,10 +82,10 @@ static void record(hg_freeze *self, const hg_freeze_row *row)
     self->held = (self->held <= last) ? (uint8_t)(self->held + 1U) : self->held;
     self->memory.row[self->newest] = *row;
     hg_real *real = &self->memory.real[self->newest * reals_of(self)];
-    copy(real, detector->value, width);
-    copy(&real[width], detector->radius, width);
-    copy(&real[2U * width], detector->r, residuals);
-    copy(&real[(2U * width) + residuals], detector->J, residuals);
+    put(real, detector->value, width);
+    put(&real[width], detector->radius, width);
+    put(&real[2U * width], detector->r, residuals);
+    put(&real[(2U * width) + residuals], detector->J, residuals);
 }
 
 /* Place in the ring of the row that so many others are older than. */
@@ -175,7 +175,7 @@ void hg_freeze_step(hg_freeze *self, const hg_freeze_row *row)
 
 /* ---- requests ---- */
 
-static hg_status refuse(hg_freeze *self, hg_status status)
+static hg_status turn_away(hg_freeze *self, hg_status status)
 {
     self->refused = (self->refused < UINT16_MAX) ? (uint16_t)(self->refused + 1U) : UINT16_MAX;
     return status;
@@ -223,17 +223,17 @@ hg_status hg_freeze_receive(hg_freeze *self, const hg_can_frame *frame)
         return HG_E_ID;
     }
     if (!hg_frame_matches(request, frame)) {
-        return refuse(self, HG_E_FORMAT);
+        return turn_away(self, HG_E_FORMAT);
     }
     if (hg_e2e_check(request->e2e, frame->data, frame->length, &header) != HG_OK) {
-        return refuse(self, HG_E_CRC);
+        return turn_away(self, HG_E_CRC);
     }
     const hg_status status = obey(self, frame->data);
     if (status != HG_E_NUMERIC) {
         self->answer = true;
         self->credit = self->config->burst;
     }
-    return (status == HG_OK) ? HG_OK : refuse(self, status);
+    return (status == HG_OK) ? HG_OK : turn_away(self, status);
 }
 
 /* ---- responses ---- */

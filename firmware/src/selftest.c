@@ -36,7 +36,7 @@ static void move(const hg_selftest_config *config, const hg_message *message, ui
 }
 
 /* Samples from one frame of a group to its next: what no level of its trigger forbids. */
-static uint32_t period_of(const hg_node *node, uint8_t group)
+static uint32_t every(const hg_node *node, uint8_t group)
 {
     const hg_trigger_config *trigger = node->config->detector->hold[group].trigger;
     uint32_t longest = 0U;
@@ -49,7 +49,7 @@ static uint32_t period_of(const hg_node *node, uint8_t group)
 static void speak(hg_node *node, uint8_t group, const int32_t *code, uint32_t k)
 {
     const hg_message *message = &node->config->message[group];
-    const uint32_t period = period_of(node, group);
+    const uint32_t period = every(node, group);
     hg_can_frame frame;
     if ((k % period) == 0U) {
         const uint8_t counter = (uint8_t)((k / period) % hg_e2e_modulus(message->e2e));
