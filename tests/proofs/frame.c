@@ -19,7 +19,7 @@ static hg_code_scale any_scale(void)
  *  @proves hg_frame_pack hg_frame_unpack hg_frame_valid hg_frame_matches
  *  @without conversion: the bytes of a pattern are cut to 8 bits on purpose
  *  @run check real=f32 unwind=33 limit=60 LENGTH=2U FLAGS=0U
- *  @run check real=f32 unwind=33 limit=60 LENGTH=2U FLAGS=3U
+ *  @run deep real=f32 unwind=33 limit=1800 LENGTH=2U FLAGS=3U
  *  @run deep real=f32 unwind=33 limit=1800 LENGTH=2U FLAGS=1U
  *  @run deep real=f32 unwind=33 limit=1800 LENGTH=2U FLAGS=2U
  *  @run deep real=f32 unwind=33 limit=7200 hg_e2e_valid.0:65 LENGTH=8U FLAGS=0U
