@@ -77,9 +77,10 @@ static void record(hg_freeze *self, const hg_freeze_row *row)
     const hg_detector *detector = self->detector;
     const uint32_t width = detector->config->width;
     const uint32_t residuals = detector->config->residuals;
-    const uint8_t last = (uint8_t)(self->config->samples - 1U);
-    self->newest = ((self->held == 0U) || (self->newest == last)) ? 0U : (uint8_t)(self->newest + 1U);
-    self->held = (self->held <= last) ? (uint8_t)(self->held + 1U) : self->held;
+    const uint8_t samples = self->config->samples;
+    /* Neither place nor count leaves the ring, whatever stands in a memory that failed. */
+    self->newest = ((self->held == 0U) || (self->newest >= (samples - 1U))) ? 0U : (uint8_t)(self->newest + 1U);
+    self->held = (self->held < samples) ? (uint8_t)(self->held + 1U) : samples;
     self->memory.row[self->newest] = *row;
     hg_real *real = &self->memory.real[self->newest * reals_of(self)];
     put(real, detector->value, width);

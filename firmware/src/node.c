@@ -82,7 +82,8 @@ static bool config_valid(const hg_node_config *config)
         valid = hg_frame_valid(&config->message[i]) && (config->detector->hold[i].trigger != NULL) &&
                 (config->message[i].width == config->detector->hold[i].trigger->width);
     }
-    return valid && has_counter(config->message[config->closing].e2e) && (FREEZES(config) == (config->freeze != NULL));
+    const bool freezes = FREEZES(config); /* false where the library has no freeze frame */
+    return valid && has_counter(config->message[config->closing].e2e) && (freezes == (config->freeze != NULL));
 }
 
 /* The freeze frame records what the detector, which has been started, makes of each sample. */

@@ -65,11 +65,11 @@ def operations(name: str) -> tuple[bytes, list[int]]:
 
 def members(name: str) -> tuple[int, list[tuple[str, int, int, bool]]]:
     """Size of the model's storage, and its members: name, offset, bytes, and is it a pointer."""
-    header = (ROOT / "firmware" / "models" / f"{name}.h").read_text(encoding="utf-8")
-    defines = dict(re.findall(r"#define (HG_\w+) (\d+)U", header))
+    command = ["gcc", "-E", "-P", "-DHG_REAL_F32=1", f"-I{ROOT}/firmware/include", str(ROOT / "firmware" / "models" / f"{name}.h")]
+    header = subprocess.run(command, check=True, capture_output=True, encoding="utf-8").stdout
     found = re.search(r"typedef struct \{([^}]*)\} hg_" + name + r"_node;", header)
     assert found is not None
-    text = re.sub(r"\[(\w+)\]", lambda m: f"[{defines.get(m[1], m[1].rstrip('U'))}]", found[1])
+    text = re.sub(r"\(uint32_t\)|(?<=\d)U\b", "", found[1])  # sizes as sums and products of numbers, which is all that cffi takes
     ffi = cffi.FFI()
     ffi.include(library("f32").ffi)
     ffi.cdef(f"typedef struct {{{text}}} flips_storage;")

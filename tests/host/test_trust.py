@@ -148,7 +148,7 @@ def test_a_wrong_table_stops_the_node(tmp_path: Path) -> None:
     ("source", "old", "new"),
     [
         ("residual.c", "    self->z = self->next;\n", ""),
-        ("decision.c", "if (alarm->up >= config->up) {", "if (alarm->up > config->up) {"),
+        ("decision.c", "(alarm->up >= config->up) ?", "(alarm->up > config->up) ?"),
     ],
 )
 def test_a_wrong_instruction_fails_the_self_test(tmp_path: Path, source: str, old: str, new: str) -> None:

@@ -14,7 +14,7 @@ static bool within(uint32_t some, uint32_t all)
  *  candidates of a confirmed plant only shrink until it is without an alarm.
  *  Any configuration of up to GENERATORS generators, any state that a step can leave, any evidence in two samples.
  *  @proves hg_decision_start hg_decision_step hg_decision_reset
- *  @run check real=f32 unwind=5 limit=30 GENERATORS=2U
+ *  @run check real=f32 unwind=5 limit=150 GENERATORS=2U
  *  @run deep real=f32 unwind=34 limit=3600 GENERATORS=32U */
 void proof_decision(void)
 {
@@ -79,8 +79,8 @@ void proof_decision(void)
 /** Any residual outside its threshold is an alarm, and so is one that is no number: never blindness.
  *  Up to RESIDUALS residuals and thresholds, any floats.
  *  @proves hg_decision_exceeds
- *  @run check real=f32 unwind=5 limit=30 RESIDUALS=3U
- *  @run check real=q31 unwind=5 limit=30 RESIDUALS=3U */
+ *  @run check real=f32 unwind=5 limit=150 RESIDUALS=3U
+ *  @run check real=q31 unwind=5 limit=150 RESIDUALS=3U */
 void proof_decision_exceeds(void)
 {
     hg_real r[RESIDUALS];

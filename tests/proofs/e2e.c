@@ -30,10 +30,10 @@ static hg_e2e_config any_config(const uint8_t *ids, const hg_e2e_limits *limits)
  *  Any valid configuration, identifiers, data, counter and stamp; frames of up to LENGTH bytes.
  *  @proves hg_e2e_protect hg_e2e_check hg_e2e_valid hg_e2e_modulus hg_e2e_owns
  *  @without conversion: checksums are cut to 8 and 16 bits on purpose
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P01
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P22
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P05
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_NONE
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P01
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P22
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P05
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_NONE
  *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:129 LENGTH=16U PROFILE=HG_E2E_P11
  *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:129 LENGTH=16U PROFILE=HG_E2E_P02
  *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:129 LENGTH=16U PROFILE=HG_E2E_P05 */
@@ -78,9 +78,9 @@ void proof_e2e_round(void)
  *  Any valid configuration with every check on, any frame of up to LENGTH bytes.
  *  @proves hg_e2e_check hg_e2e_protect
  *  @without conversion: checksums are cut to 8 and 16 bits on purpose
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P11
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P02
- *  @run check real=f32 unwind=17 limit=30 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P05
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P11
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P02
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P05
  *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:65 LENGTH=8U PROFILE=HG_E2E_P01
  *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:65 LENGTH=8U PROFILE=HG_E2E_P22
  *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:65 LENGTH=8U PROFILE=HG_E2E_P05 */
@@ -117,7 +117,7 @@ void proof_e2e_exact(void)
 /** A configuration is valid only with its places inside the frame and apart, tables there and limits in range, whatever stands in it; null is refused.
  *  Any configuration, with profiles, modes and limits out of range too; frames of up to LENGTH bytes. Of longer ones the loop over the bits is the same.
  *  @proves hg_e2e_valid hg_e2e_owns hg_e2e_modulus
- *  @run check real=f32 unwind=41 limit=30 LENGTH=5U
+ *  @run check real=f32 unwind=41 limit=150 LENGTH=5U
  *  @run deep real=f32 unwind=513 limit=3600 LENGTH=64U */
 void proof_e2e_valid(void)
 {
@@ -147,9 +147,9 @@ void proof_e2e_valid(void)
  *  jump `resync` frames in sequence are refused.
  *  Any profile, any two counters, any step, resynchronisation or none.
  *  @proves hg_e2e_sequence hg_e2e_repeated hg_e2e_receiver_start hg_e2e_modulus
- *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P01
- *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P22
- *  @run check real=f32 unwind=2 limit=30 PROFILE=HG_E2E_P05
+ *  @run check real=f32 unwind=2 limit=150 PROFILE=HG_E2E_P01
+ *  @run check real=f32 unwind=2 limit=150 PROFILE=HG_E2E_P22
+ *  @run check real=f32 unwind=2 limit=150 PROFILE=HG_E2E_P05
  *  @run deep real=f32 unwind=2 limit=3600 */
 void proof_e2e_sequence(void)
 {
@@ -212,7 +212,7 @@ static uint8_t ones(uint16_t bits, uint8_t window)
  *  Any valid limits, any state, any event.
  *  @proves hg_e2e_machine_step hg_e2e_machine_start
  *  @without conversion: windows are cut to 16 bits on purpose
- *  @run check real=f32 unwind=18 limit=30 */
+ *  @run check real=f32 unwind=18 limit=150 */
 void proof_e2e_machine(void)
 {
     const hg_e2e_limit one = {.window = any_u8_in(1U, 16U), .ok = any_u8(), .error = any_u8()};

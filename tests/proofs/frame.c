@@ -18,7 +18,7 @@ static hg_code_scale any_scale(void)
  *  Any valid message of one integer field, in any frame of up to LENGTH bytes; of byte order and sign FLAGS; any code.
  *  @proves hg_frame_pack hg_frame_unpack hg_frame_valid hg_frame_matches
  *  @without conversion: the bytes of a pattern are cut to 8 bits on purpose
- *  @run check real=f32 unwind=33 limit=60 LENGTH=2U FLAGS=0U
+ *  @run check real=f32 unwind=33 limit=150 LENGTH=2U FLAGS=0U
  *  @run deep real=f32 unwind=33 limit=1800 LENGTH=2U FLAGS=3U
  *  @run deep real=f32 unwind=33 limit=1800 LENGTH=2U FLAGS=1U
  *  @run deep real=f32 unwind=33 limit=1800 LENGTH=2U FLAGS=2U
@@ -87,8 +87,8 @@ void proof_frame_layout(void)
  *  Any valid message of WIDTH fields, float32 fields among them, in a frame of up to LENGTH bytes; any bytes.
  *  @proves hg_frame_unpack hg_frame_valid
  *  @without conversion: the bytes of a pattern are cut to 8 bits on purpose
- *  @run check real=f32 unwind=33 limit=30 LENGTH=4U WIDTH=1U
- *  @run check real=q31 unwind=33 limit=30 LENGTH=3U WIDTH=1U
+ *  @run check real=f32 unwind=33 limit=150 LENGTH=4U WIDTH=1U
+ *  @run check real=q31 unwind=33 limit=150 LENGTH=3U WIDTH=1U
  *  @run deep real=f32 unwind=33 limit=3600 hg_e2e_valid.0:65 LENGTH=8U WIDTH=2U */
 void proof_frame_unpack(void)
 {

@@ -138,7 +138,7 @@ void proof_fusion_close(void)
 /** A consistency test keeps to its memory and blames only sensors that there are, whatever the filter's records are.
  *  STATES states, SENSORS sensors, ONSETS hypotheses; any numbers and records; one sample in any state.
  *  @proves hg_consistency_start hg_consistency_reset hg_consistency_step
- *  @run check real=f32 unwind=6 limit=30 STATES=1U SENSORS=2U ONSETS=1U ANY_NUMBERS
+ *  @run check real=f32 unwind=6 limit=150 STATES=1U SENSORS=2U ONSETS=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=10 limit=3600 STATES=3U SENSORS=3U ONSETS=3U */
 void proof_consistency(void)
 {

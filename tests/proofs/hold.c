@@ -33,7 +33,7 @@ static int32_t moved(int32_t from)
  *  One channel, one unit a code, in integers; any signal within +-RANGE that moves by at most SLEW a sample; interval_max INTERVAL, LEVELS levels; any absolute and relative
  *  thresholds (delta a multiple of 1/16) and activities up to SIGMA, any silence. A lost frame is known by the next one's counter or at once; the sender starts with the first sample.
  *  @proves hg_hold_start hg_hold_receive hg_hold_lose hg_hold_step hg_hold_past hg_hold_doubt
- *  @run check real=q31 unwind=7 limit=30 SAMPLES=5U INTERVAL=3U LEVELS=1U SIGMA=7 SLEW=3 RANGE=15 MARGIN=1U
+ *  @run check real=q31 unwind=7 limit=150 SAMPLES=5U INTERVAL=3U LEVELS=1U SIGMA=7 SLEW=3 RANGE=15 MARGIN=1U
  *  @run deep real=q31 unwind=9 limit=3600 SAMPLES=7U INTERVAL=4U LEVELS=2U SIGMA=7 SLEW=3 RANGE=15 MARGIN=1U
  *  @run deep real=q31 unwind=10 limit=7200 SAMPLES=8U INTERVAL=4U LEVELS=2U SIGMA=7 SLEW=3 RANGE=31 MARGIN=1U */
 void proof_hold_radius(void)
@@ -128,7 +128,7 @@ typedef struct {
  *  only for samples that the slew's table knows; a second frame of a sample is refused.
  *  WIDTH channels, LEVELS levels, a slew table of up to HORIZON rows; any tables, middles finite; two samples after any state that samples can leave.
  *  @proves hg_hold_start hg_hold_receive hg_hold_lose hg_hold_step hg_hold_past hg_hold_rewrite hg_hold_doubt hg_hold_age hg_hold_health
- *  @run check real=f32 unwind=6 limit=30 WIDTH=1U LEVELS=1U HORIZON=3U LENGTH=3U
+ *  @run check real=f32 unwind=6 limit=150 WIDTH=1U LEVELS=1U HORIZON=3U LENGTH=3U
  *  @run deep real=f32 unwind=12 limit=3600 WIDTH=3U LEVELS=2U HORIZON=4U LENGTH=4U */
 void proof_hold_step(void)
 {

@@ -8,7 +8,7 @@
  *  Any power of two of places up to LENGTH, any counters that agree, any OPERATIONS puts and gets.
  *  @proves hg_inbox_start hg_inbox_put hg_inbox_get
  *  @without conversion: written - read is meant to wrap at 256
- *  @run check real=f32 unwind=7 limit=30 LENGTH=2U OPERATIONS=6U */
+ *  @run check real=f32 unwind=7 limit=150 LENGTH=2U OPERATIONS=6U */
 void proof_inbox(void)
 {
     hg_can_frame memory[LENGTH];

@@ -7,7 +7,7 @@
 /** An isolation reads and writes its own memory only, whatever the estimates are, names only candidates that there are, and refuses what is not finite without a change.
  *  ESTIMATES estimates, SENSORS sensors, COMPONENTS components, BLOCKS blocks; any tables that hg_isolate_valid() accepts; a start and one sample in any state of an episode.
  *  @proves hg_isolate_start hg_isolate_valid hg_isolate_reset hg_isolate_step
- *  @run check real=f32 unwind=24 limit=60 ESTIMATES=2U SENSORS=1U COMPONENTS=1U BLOCKS=1U ANY_NUMBERS
+ *  @run check real=f32 unwind=24 limit=150 ESTIMATES=2U SENSORS=1U COMPONENTS=1U BLOCKS=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=40 limit=3600 ESTIMATES=3U SENSORS=1U COMPONENTS=2U BLOCKS=2U */
 void proof_isolate_step(void)
 {

@@ -38,8 +38,8 @@ static bool summable(const hg_real *table, uint8_t rows, uint8_t cols)
  *  design's bound allows.
  *  ORDER rows, ORDER and WIDTH columns; any numbers, of fixed-point tables magnitudes that add up to less than 2^31 a row.
  *  @proves hg_linalg_apply hg_linalg_fits hg_linalg_rows hg_linalg_add_four hg_linalg_add_two hg_linalg_add_one hg_linalg_no_sums hg_linalg_finite hg_linalg_in_order
- *  @run check real=f32 unwind=10 limit=30 ORDER=7U WIDTH=3U ANY_NUMBERS
- *  @run check real=q31 unwind=10 limit=30 ORDER=2U
+ *  @run check real=f32 unwind=10 limit=150 ORDER=7U WIDTH=3U ANY_NUMBERS
+ *  @run check real=q31 unwind=10 limit=150 ORDER=2U
  *  @run deep real=q31 unwind=10 limit=1800 ORDER=5U WIDTH=3U */
 void proof_linalg_apply(void)
 {
@@ -79,7 +79,7 @@ void proof_linalg_apply(void)
 #if !HG_REAL_Q31
 /** The square root ends after a fixed number of steps for any number, NaN and infinity too.
  *  @proves hg_linalg_root
- *  @run check real=f32 unwind=76 limit=30 */
+ *  @run check real=f32 unwind=76 limit=150 */
 void proof_linalg_root(void)
 {
     hg_real x;
@@ -93,9 +93,9 @@ void proof_linalg_root(void)
  *  is not finite never enters z.
  *  ORDER states, RESIDUALS residuals, WIDTH signals out of SIGNALS; any tables and numbers; two samples.
  *  @proves hg_residual_start hg_residual_valid hg_residual_step hg_residual_reset
- *  @run check real=f32 unwind=9 limit=30 ORDER=5U WIDTH=2U RESIDUALS=3U SIGNALS=3U ANY_NUMBERS
- *  @run check real=f32 unwind=9 limit=30 ANY_NUMBERS
- *  @run check real=q31 unwind=9 limit=30 ORDER=2U SIGNALS=2U */
+ *  @run check real=f32 unwind=9 limit=150 ORDER=5U WIDTH=2U RESIDUALS=3U SIGNALS=3U ANY_NUMBERS
+ *  @run check real=f32 unwind=9 limit=150 ANY_NUMBERS
+ *  @run check real=q31 unwind=9 limit=150 ORDER=2U SIGNALS=2U */
 void proof_residual_step(void)
 {
     hg_real A[ORDER * ORDER];
@@ -144,7 +144,7 @@ void proof_residual_step(void)
 /** Observer and filter in series: the filter reads what the observer says (RESIDUALS and SIGNALS are equal), and neither moves when the observer refuses.
  *  ORDER states and RESIDUALS residuals each; any tables and numbers.
  *  @proves hg_residual_pair_step
- *  @run check real=f32 unwind=9 limit=30 ORDER=2U WIDTH=2U RESIDUALS=2U SIGNALS=2U ANY_NUMBERS */
+ *  @run check real=f32 unwind=9 limit=150 ORDER=2U WIDTH=2U RESIDUALS=2U SIGNALS=2U ANY_NUMBERS */
 void proof_residual_pair(void)
 {
     hg_real A[ORDER * ORDER];
@@ -177,7 +177,7 @@ void proof_residual_pair(void)
 /** What an uncertain plant may do has a radius that is finite and never NaN, whatever the signals are; tables are valid only when they are there and name signals that there are.
  *  Up to RESIDUALS states and WIDTH signals out of SIGNALS; any tables, constants >= 0, and any numbers.
  *  @proves hg_mismatch_valid hg_mismatch_step hg_mismatch_grow
- *  @run check real=f32 unwind=5 limit=30 WIDTH=2U RESIDUALS=2U SIGNALS=2U ANY_NUMBERS */
+ *  @run check real=f32 unwind=5 limit=150 WIDTH=2U RESIDUALS=2U SIGNALS=2U ANY_NUMBERS */
 void proof_mismatch(void)
 {
     uint8_t signal[WIDTH];
@@ -205,7 +205,7 @@ void proof_mismatch(void)
 /** A prediction is never wider than what the hold says, and there is one only after it has settled, within its horizon; the parts of its memory fill it and do not overlap.
  *  ORDER states, RESIDUALS signals of the group, WIDTH inputs out of SIGNALS signals, HORIZON samples; any tables and numbers; one sample after any state.
  *  @proves hg_predict_valid hg_predict_start hg_predict_reset hg_predict_step
- *  @run check real=f32 unwind=7 limit=30 ORDER=2U WIDTH=2U SIGNALS=3U HORIZON=2U ANY_NUMBERS
+ *  @run check real=f32 unwind=7 limit=150 ORDER=2U WIDTH=2U SIGNALS=3U HORIZON=2U ANY_NUMBERS
  *  @run deep real=f32 unwind=7 limit=1800 ORDER=5U WIDTH=2U RESIDUALS=3U SIGNALS=5U HORIZON=4U ANY_NUMBERS */
 
 void proof_predict(void)

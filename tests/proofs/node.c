@@ -69,7 +69,7 @@ void proof_node_receive(void)
  *  The platoon's tables; a start anywhere, two samples whose closing frames did not come, any earlier report.
  *  @proves hg_node_step hg_node_report hg_node_overdue
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=60 hg_detector_start.0:153 hg_ring_reset.0:109 ANY_NUMBERS */
+ *  @run check real=f32 unwind=65 limit=150 hg_detector_start.0:153 hg_ring_reset.0:109 ANY_NUMBERS */
 void proof_node_step(void)
 {
     parts p;
@@ -107,7 +107,7 @@ void proof_node_step(void)
  *  The platoon's messages of 8 bytes, and a verdict of 12; any verdicts and counts.
  *  @proves hg_verdict_write hg_verdict_read hg_status_write hg_report_valid hg_link_refuse
  *  @without conversion: bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=97 limit=30 */
+ *  @run check real=f32 unwind=97 limit=150 */
 void proof_verdict_round(void)
 {
     hg_message wide = *hg_platoon_config.verdict;
@@ -191,7 +191,7 @@ void proof_detector_step(void)
  *  The platoon's measurement message; any values, NaN and infinity among them, any sample, any counter; a start and two samples.
  *  @proves hg_sender_start hg_sender_step
  *  @without conversion: bytes and checksums are cut on purpose
- *  @run check real=f32 unwind=65 limit=30 */
+ *  @run check real=f32 unwind=65 limit=150 */
 void proof_sender_step(void)
 {
     const hg_sender_config *config = &hg_platoon_sender[0];

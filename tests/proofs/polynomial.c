@@ -12,7 +12,7 @@
  *  Any number of variables up to 255 and degree up to DEGREE.
  *  @proves hg_polynomial_count hg_polynomial_reals
  *  @without unsigned-overflow conversion: products are checked before they are used
- *  @run check real=f32 unwind=5 limit=30 DEGREE=3U */
+ *  @run check real=f32 unwind=5 limit=150 DEGREE=3U */
 void proof_polynomial_count(void)
 {
     const uint32_t variables = any_u8();

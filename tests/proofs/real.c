@@ -14,7 +14,7 @@ static int64_t magnitude(int64_t x)
 /** A number in fixed point is scaled down to the nearest, ties away from zero: off by half a step at most, and never of the other sign.
  *  Any 64-bit number and number of places that the header allows.
  *  @proves hg_q31_shift
- *  @run check real=q31 unwind=2 limit=30 */
+ *  @run check real=q31 unwind=2 limit=150 */
 void proof_q31_shift(void)
 {
     const int64_t x = any_i64();
@@ -33,7 +33,7 @@ void proof_q31_shift(void)
 /** Sums, differences, magnitudes and whatever does not fit 32 bits are exact or saturate at -(2^31 - 1) and 2^31 - 1.
  *  Any operands, the saturated ones too.
  *  @proves hg_q31_saturate hg_real_add hg_real_sub hg_real_abs hg_real_finite hg_real_defect hg_real_max hg_real_min hg_real_widen
- *  @run check real=q31 unwind=2 limit=30 */
+ *  @run check real=q31 unwind=2 limit=150 */
 void proof_q31_sums(void)
 {
     const hg_real a = any_i32();
@@ -57,7 +57,7 @@ void proof_q31_sums(void)
 /** A product in fixed point saturates, without overflow on the way: it is hg_q31_shift() and hg_q31_saturate(), which have proofs of their own, of a product that fits 63 bits.
  *  Any operands.
  *  @proves hg_real_mul
- *  @run check real=q31 unwind=2 limit=30 */
+ *  @run check real=q31 unwind=2 limit=150 */
 void proof_q31_mul(void)
 {
     const hg_real product = hg_real_mul(any_i32(), any_i32());
@@ -68,7 +68,7 @@ void proof_q31_mul(void)
 /** A sum of products comes back to the nearest step or saturates, whatever power of two it is scaled by; adding to it is exact as long as it stays in 63 bits.
  *  Any sum of magnitude below 2^63, any valid exponent; any factors whose product fits beside the sum.
  *  @proves hg_acc_real hg_acc_mac hg_acc_zero hg_exponent_valid
- *  @run check real=q31 unwind=2 limit=30 */
+ *  @run check real=q31 unwind=2 limit=150 */
 void proof_q31_acc(void)
 {
     const hg_acc sum = any_i64();
@@ -93,7 +93,7 @@ void proof_q31_acc(void)
 /** A code becomes a value and a value a code without overflow, whatever the scale's tables hold: a code that is none is INT32_MIN.
  *  Any numbers and codes, any valid power of two.
  *  @proves hg_real_of_code hg_real_to_code hg_code_exponent_valid hg_code_value hg_code_encode hg_code_valid
- *  @run check real=q31 unwind=2 limit=30 */
+ *  @run check real=q31 unwind=2 limit=150 */
 void proof_q31_code(void)
 {
     const hg_code_scale scale = {.resolution = any_i32(), .offset = any_i32(), .per_unit = any_i32(), .exponent = any_i8(), .minimum = any_i32(), .maximum = any_i32()};
@@ -119,8 +119,8 @@ void proof_q31_code(void)
  *  HG_CODE_INVALID.
  *  Any floats and ranges.
  *  @proves hg_real_to_code hg_code_encode hg_code_value hg_real_of_code hg_code_exponent_valid
- *  @run check real=f32 unwind=2 limit=30
- *  @run check real=f64 unwind=2 limit=30 */
+ *  @run check real=f32 unwind=2 limit=150
+ *  @run check real=f64 unwind=2 limit=150 */
 void proof_float_code(void)
 {
     hg_code_scale scale;
@@ -140,8 +140,8 @@ void proof_float_code(void)
 /** The code of a value is no further from value / resolution than half a code and 2^-22 of it; there is none only for what is not finite or beyond 31 bits.
  *  Any float; a resolution of 1, so that the quotient is the value.
  *  @proves hg_real_to_code
- *  @run check real=f32 unwind=2 limit=30
- *  @run check real=f64 unwind=2 limit=30 */
+ *  @run check real=f32 unwind=2 limit=150
+ *  @run check real=f64 unwind=2 limit=150 */
 void proof_float_nearest(void)
 {
     hg_real value;
@@ -159,8 +159,8 @@ void proof_float_nearest(void)
 /** NaN and infinity are told from numbers by comparisons and by a sum of defects; larger, smaller and magnitude are those of the numbers.
  *  Any floats.
  *  @proves hg_real_finite hg_real_defect hg_real_abs hg_real_max hg_real_min hg_real_add hg_real_sub hg_real_mul hg_real_widen hg_exponent_valid hg_acc_zero hg_acc_real hg_acc_mac
- *  @run check real=f32 unwind=2 limit=30
- *  @run check real=f64 unwind=2 limit=30 */
+ *  @run check real=f32 unwind=2 limit=150
+ *  @run check real=f64 unwind=2 limit=150 */
 void proof_float_primitives(void)
 {
     hg_real a;

@@ -8,8 +8,8 @@
 /** A ring starts with nothing but zeros; what is pushed is the newest row, every older row stays what it was until it is the oldest, and a row that is not finite changes nothing.
  *  Any width and length up to WIDTH and LENGTH, any numbers, the newest row in any place; one push after any past.
  *  @proves hg_ring_start hg_ring_reset hg_ring_push hg_ring_open hg_ring_row
- *  @run check real=f32 unwind=10 limit=30 WIDTH=3U LENGTH=3U
- *  @run check real=q31 unwind=10 limit=30 WIDTH=3U LENGTH=3U */
+ *  @run check real=f32 unwind=10 limit=150 WIDTH=3U LENGTH=3U
+ *  @run check real=q31 unwind=10 limit=150 WIDTH=3U LENGTH=3U */
 void proof_ring_push(void)
 {
     hg_real memory[WIDTH * LENGTH];
@@ -60,7 +60,7 @@ void proof_ring_push(void)
 /** A part of a past row is overwritten, and nothing else; a lag beyond the ring is ignored.
  *  Any width and length up to WIDTH and LENGTH, any place, any lag.
  *  @proves hg_ring_rewrite
- *  @run check real=f32 unwind=10 limit=30 WIDTH=3U LENGTH=3U */
+ *  @run check real=f32 unwind=10 limit=150 WIDTH=3U LENGTH=3U */
 void proof_ring_rewrite(void)
 {
     hg_real memory[WIDTH * LENGTH];

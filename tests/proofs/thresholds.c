@@ -40,7 +40,7 @@ static hg_hull_config hull_config(const hull_tables *t)
  *  infinite, whatever the radii are.
  *  RESIDUALS residuals, WIDTH signals out of SIGNALS, MODES modes, a ring of LENGTH rows, SETTLE rows of bias; any tables that hg_hull_valid() accepts, any radii, any sample.
  *  @proves hg_hull_start hg_hull_valid hg_hull_reset hg_hull_step hg_hull_ready
- *  @run check real=f32 unwind=8 limit=30 RESIDUALS=3U WIDTH=1U SIGNALS=1U MODES=1U LENGTH=3U SETTLE=2U ANY_NUMBERS
+ *  @run check real=f32 unwind=8 limit=150 RESIDUALS=3U WIDTH=1U SIGNALS=1U MODES=1U LENGTH=3U SETTLE=2U ANY_NUMBERS
  *  @run deep real=f32 unwind=13 limit=3600 RESIDUALS=3U WIDTH=2U SIGNALS=2U MODES=2U LENGTH=4U SETTLE=2U */
 void proof_hull_step(void)
 {
@@ -77,7 +77,7 @@ void proof_hull_step(void)
 /** A bank's certificates read exactly their tables and the rings' windows; what is not finite is refused with a residual of 0, and the closest certificate is one that there is.
  *  CERTIFICATES certificates, WIDTH signals and EXTRAS extras out of SIGNALS, a window of LENGTH samples; any tables that hg_bank_valid() accepts, any values and radii.
  *  @proves hg_bank_start hg_bank_valid hg_bank_reset hg_bank_step hg_bank_ready
- *  @run check real=f32 unwind=8 limit=30 CERTIFICATES=2U WIDTH=1U EXTRAS=1U SIGNALS=2U LENGTH=2U ANY_NUMBERS
+ *  @run check real=f32 unwind=8 limit=150 CERTIFICATES=2U WIDTH=1U EXTRAS=1U SIGNALS=2U LENGTH=2U ANY_NUMBERS
  *  @run deep real=f32 unwind=13 limit=3600 CERTIFICATES=3U WIDTH=2U EXTRAS=1U SIGNALS=3U LENGTH=3U */
 void proof_bank_step(void)
 {
@@ -120,7 +120,7 @@ void proof_bank_step(void)
  *  memory is that of its two parts, one after another.
  *  RESIDUALS estimates, ORDER states, WIDTH signals out of SIGNALS, a ring of LENGTH rows; any tables that hg_uio_valid() accepts, any signals and radii.
  *  @proves hg_uio_start hg_uio_valid hg_uio_reset hg_uio_step hg_uio_follow hg_uio_ready
- *  @run check real=f32 unwind=8 limit=30 RESIDUALS=2U WIDTH=1U SIGNALS=1U MODES=1U LENGTH=2U SETTLE=1U ORDER=1U ANY_NUMBERS
+ *  @run check real=f32 unwind=8 limit=150 RESIDUALS=2U WIDTH=1U SIGNALS=1U MODES=1U LENGTH=2U SETTLE=1U ORDER=1U ANY_NUMBERS
  *  @run deep real=f32 unwind=13 limit=3600 RESIDUALS=3U WIDTH=2U SIGNALS=2U MODES=1U LENGTH=3U SETTLE=2U ORDER=2U */
 void proof_uio_step(void)
 {

@@ -32,7 +32,7 @@ static hg_trigger_config config_of(const tables *t)
  *  what it has sent is what it was given; a silent one leaves its codes as they are.
  *  Any tables of WIDTH channels and LEVELS levels at most; any state that a start and samples can leave (level and age in range), any codes.
  *  @proves hg_trigger_start hg_trigger_step hg_trigger_valid
- *  @run check real=f32 unwind=5 limit=30 WIDTH=2U LEVELS=2U */
+ *  @run check real=f32 unwind=5 limit=150 WIDTH=2U LEVELS=2U */
 void proof_trigger_step(void)
 {
     tables t;
@@ -98,7 +98,7 @@ void proof_trigger_threshold(void)
 /** The level follows from two frames alone and is the highest that some channel's activity reaches; a channel that is or was invalid reaches every one.
  *  Any tables of WIDTH channels and LEVELS levels at most, any codes.
  *  @proves hg_trigger_level
- *  @run check real=f32 unwind=4 limit=30 WIDTH=2U LEVELS=3U */
+ *  @run check real=f32 unwind=4 limit=150 WIDTH=2U LEVELS=3U */
 void proof_trigger_level(void)
 {
     tables t;
@@ -127,7 +127,7 @@ void proof_trigger_level(void)
 /** Null pointers are refused, and so are tables out of range, without a write.
  *  Any null pointers.
  *  @proves hg_trigger_start
- *  @run check real=f32 unwind=4 limit=30 WIDTH=2U LEVELS=2U */
+ *  @run check real=f32 unwind=4 limit=150 WIDTH=2U LEVELS=2U */
 void proof_trigger_start(void)
 {
     tables t;

@@ -5,6 +5,7 @@
 
 #include "hullguard/code.h"
 #include "hullguard/frame.h"
+#include "hullguard/freeze.h"
 #include "hullguard/hold.h"
 #include "hullguard/hull.h"
 #include "hullguard/residual.h"
@@ -659,6 +660,17 @@ static void codes_at_the_ends_of_the_exponents(void **state)
     }
 }
 
+/* A reader of a freeze frame learns from its first word what its numbers are. */
+static void a_freeze_frame_says_that_its_numbers_are_fixed_point(void **state)
+{
+    (void)state;
+    const hg_detector_config config = {.width = 1U, .residuals = 1U};
+    const hg_detector detector = {.config = &config};
+    const hg_freeze_config recorded = {.samples = 2U};
+    const hg_freeze self = {.config = &recorded, .detector = &detector, .held = 2U};
+    assert_int_equal(3U, (hg_freeze_word(&self, 0U) >> 8U) & 0xFFU);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -677,6 +689,7 @@ int main(void)
         cmocka_unit_test(a_hold_knows_values_and_radii_to_the_step),
         cmocka_unit_test(scales_with_an_exponent_out_of_range_are_refused),
         cmocka_unit_test(codes_at_the_ends_of_the_exponents),
+        cmocka_unit_test(a_freeze_frame_says_that_its_numbers_are_fixed_point),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
