@@ -174,9 +174,7 @@ static void every_bit_counts(const hg_node_config *config, const table *tables, 
         for (size_t b = 0U; b < (8U * tables[i].bytes); b++) {
             const uint8_t bit = (uint8_t)(1U << (b % 8U));
             byte[b / 8U] ^= bit;
-            if (digest_of(config) == good) {
-                fail_msg("table %zu, bit %zu", i, b);
-            }
+            assert_true(digest_of(config) != good);
             byte[b / 8U] ^= bit;
         }
     }
