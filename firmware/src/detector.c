@@ -439,8 +439,10 @@ static void step_holds(hg_detector *self, hg_evidence *evidence)
     /* Sizes again from the tables: they lead every read and write of the rings, and their copies in RAM could be any number. */
     self->radii.width = config->width;
     self->radii.length = config->history;
-    self->values.width = config->signals;
-    self->values.length = config->window;
+    if (banks_of(config) > 0U) {
+        self->values.width = config->signals;
+        self->values.length = config->window;
+    }
     self->radius = hg_ring_open(&self->radii);
     for (uint8_t i = 0U; i < groups_of(config); i++) {
         hg_hold *hold = &self->memory.hold[i];

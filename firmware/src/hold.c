@@ -218,9 +218,14 @@ void hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewin
         self->gap_age = age;
     }
     self->gap = fresh && self->gap;
-    /* Where a past is rewritten it is within 1 .. interval_max; what stands in RAM may be any number, and the tables end there. */
-    self->gap_age = (self->gap_age < config->trigger->interval_max) ? self->gap_age : config->trigger->interval_max;
-    *rewind = ((newly_lost || self->gap) && (self->gap_age > 0U)) ? (uint8_t)(self->gap_age - 1U) : 0U;
+    *rewind = 0U;
+    if (newly_lost || self->gap) {
+        /* It is within 1 .. interval_max; what stands in a memory that failed may be any number, and the tables end there. */
+        if ((uint8_t)(self->gap_age - 1U) >= config->trigger->interval_max) {
+            self->gap_age = config->trigger->interval_max;
+        }
+        *rewind = (uint8_t)(self->gap_age - 1U);
+    }
     self->doubt = (!fresh) && (!lost) && (was_in_doubt || conditional);
     self->age = age;
     self->lost = lost;

@@ -28,7 +28,7 @@ SET_zonotope    := detector.threshold=zonotope
 SOURCE_derived  := platoon
 SET_derived     := detector.prediction=true plant.drag_per_s={value=1.0,pm=0.1}
 BENCH_MODELS    := $(MODELS) $(VARIANTS)
-NOT_q31         := $(VARIANTS) $(notdir $(basename $(shell grep -l "^.if HG_REAL_Q31" firmware/models/*.h)))# what has no fixed-point form
+NOT_q31         := $(VARIANTS) $(notdir $(basename $(shell grep -l "^.error .* fixed" firmware/models/*.h)))# what has no fixed-point form
 bench_models    = $(filter-out $(NOT_$(1)),$(BENCH_MODELS))
 bench_source    = $(or $(SOURCE_$(1)),$(1))
 bench_tables    = $(if $(SOURCE_$(1)),$(BENCH)/tables/$(1)/$(SOURCE_$(1)).c,firmware/models/$(1).c)

@@ -352,7 +352,8 @@ int main(void)
 {
     bool good = true;
     for (size_t i = 0U; i < (sizeof(subjects) / sizeof(subjects[0])); i++) {
-        good = tested(&subjects[i]) && run(&subjects[i]) && good;
+        const bool passes = tested(&subjects[i]); /* the drive says how other bits show, so it is run all the same */
+        good = run(&subjects[i]) && passes && good;
     }
 #if !HG_REAL_Q31
     const uint64_t fusion = corpus_fusion(SAMPLES);

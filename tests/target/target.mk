@@ -20,7 +20,7 @@ UNIT_BOARD_cortex_m0 := cortex_m3
 # images and corpus of all; `make target-tests` runs all on all.
 UNIT_SLOW  := test_adversary test_e2e_errors test_hull test_robust test_zonotope
 CORPUS_QUICK := $(filter-out $(patsubst %,%-q31,cortex_m3 cortex_m33 cortex_m7 cortex_r5f rv32imafc),$(RUN_BUILDS))# theirs are the instructions of the others
-TARGET_UNIT := $(filter-out test_digest,$(UNIT_TESTS))# that one has the tables of every model; digests of tables are in the corpus
+TARGET_UNIT := $(filter-out test_digest test_selftest,$(UNIT_TESTS))# these have the tables of models; their digests and self-tests are in the corpus
 UNIT_QUICK := $(foreach t,cortex_m0 cortex_m4f powerpc,$(patsubst %,$(TARGET_TESTS)/$(t)/%.ok,$(filter-out $(UNIT_SLOW),$(TARGET_UNIT))))
 
 # What a program is made of beside its test: by the C library of its target.

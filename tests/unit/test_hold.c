@@ -755,7 +755,7 @@ static void an_age_that_cannot_be_leads_to_no_other_table(void **state)
         r.hold.gap = true;
         r.hold.gap_age = ages[i];
         step(&r);
-        assert_int_equal((ages[i] == 0U) ? 0 : (int)(INTERVAL - 1U), (int)r.rewind);
+        assert_int_equal(INTERVAL - 1U, r.rewind); /* as far as one can have been lost */
     }
 }
 
