@@ -335,7 +335,7 @@ PICTURE: dict[str, Callable[[Path], None]] = {
 }  # fmt: skip
 
 
-ELSEWHERE = ("motor.png",)  # of the tutorial, whose run made it: not made again here
+ELSEWHERE = ("motor.png",)  # of the tutorial: `make figures` takes it from its run
 
 
 # ---- all of it ----
