@@ -21,7 +21,6 @@ from markdown_it.token import Token
 
 ROOT = Path(__file__).resolve().parents[2]
 STYLE = Path(__file__).with_name("style.css")
-BUILT = ("build", ".venv", ".git")
 WORD = re.compile(r"\b(hg|HG)_\w+|\b\w+\.h\b")
 COLUMNS = "\0"  # begins a block that is set in columns
 TAG = re.compile(r"@(param|retval)(\[[\w,]+\])?\s+")
@@ -39,7 +38,7 @@ class Site:
 
 def markdown_files() -> tuple[Path, ...]:
     """Every markdown file of the tree, README first."""
-    found = [p.relative_to(ROOT) for p in sorted(ROOT.rglob("*.md")) if not set(p.relative_to(ROOT).parts) & set(BUILT)]
+    found = [p.relative_to(ROOT) for p in sorted(ROOT.rglob("*.md")) if not any(part == "build" or part.startswith(".") for part in p.relative_to(ROOT).parts)]
     return tuple(sorted(found, key=lambda p: (len(p.parts) > 1, str(p))))
 
 
