@@ -117,7 +117,7 @@ def build_parser() -> argparse.ArgumentParser:
         return commands.add_parser(name, help=text, description=text, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)
 
     p = add("design", "check a model, find its detector, and write C tables, DBC and design report")
-    p.epilog = f"{FREEZE}\n{STATUS}"
+    p.epilog = f"{FREEZE}\n{EPILOG}"
     _common(p)
     p.add_argument("--out", metavar="DIR", help="folder for tables, DBC and report (default build/NAME)")
     p.add_argument("--fresh", action="store_true", help="search again even if NAME.design.toml fits the model")

@@ -210,7 +210,7 @@ def test_no_held_value_brings_a_residual_over_its_threshold_after_a_lost_frame_h
 
 NO_SILENCE = {"hold.c": [("(!lost) && (age > self->silence)", "(!lost) && (!fresh)")]}
 NO_REWRITING = {"detector.c": [("hg_hold_rewrite(&self->memory.hold[group], &self->radii, first, lags);", "(void)first;")]}
-NO_REWIND = {"hold.c": [("*rewind = (newly_lost || self->gap) ? (uint8_t)(self->gap_age - 1U) : 0U;", "*rewind = 0U;")]}
+NO_REWIND = {"hold.c": [("*rewind = (uint8_t)(self->gap_age - 1U);", "*rewind = 0U;")]}
 NO_CANCEL = {"decision.c": [("((alarm->pending & evidence->rewound) != 0U)", "false")]}
 SMALL_J = {
     "hull.c": [

@@ -41,9 +41,9 @@ def processes(workers: int) -> Way:
             yield from serial(tasks)
             return
         with ProcessPoolExecutor(min(workers, len(tasks)), mp_context=multiprocessing.get_context("spawn")) as pool:
-            with deaf():  # each of the first tasks starts a worker
-                waiting = {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[:workers]}
             try:
+                with deaf():  # each of the first tasks starts a worker
+                    waiting = {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[:workers]}
                 waiting |= {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[workers:]}
                 for done in as_completed(waiting):
                     yield waiting[done], done.result()
