@@ -79,7 +79,8 @@ test: ## set up all that is needed, build, test the library and the host tools
 	@host_tools/setup.sh test
 	@+$(parts) $(TEST_PARTS)
 	@echo "all tests passed: $(TEST_PARTS)"
-check: ## the same for what takes other processors: targets, emulated boards, faulty frames, sizes; and coverage
+check: export HULLGUARD_SEED ?= 1
+check: ## proofs, coverage, mutation, fuzzing, targets, emulated boards, sizes, and that each gate can fail (HULLGUARD_SEED=n: other draws; 1)
 	@host_tools/setup.sh check
 	@rm -f $(CHECK_PARTS:%=$(BUILD)/results/%.json)
 	@+$(parts) $(CHECK_PARTS)
