@@ -289,7 +289,9 @@ def test_a_report_is_drawn_again_from_the_files_of_a_run(cli: Cli, finished: tup
 
 def test_ctrl_c_ends_a_campaign_with_one_line() -> None:
     command = [sys.executable, "-m", "hullguard", "campaign", "platoon", "--scenario", "rest", "--runs", "2000000", "--workers", "2", "-q"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    # A shell's background jobs ignore the signal, and so would all that they start.
+    hears = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=hears)
     time.sleep(5.0)
     os.killpg(process.pid, signal.SIGINT)
     try:
