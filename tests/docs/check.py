@@ -21,25 +21,25 @@ def complaints(headers: Sequence[Header], site: Path) -> list[str]:
     return [*unexplained(headers), *unknown_statuses(headers), *unannounced(headers, sorted(SOURCES.glob("*.c"))), *broken_links(site)]
 
 
-def facts(headers: Sequence[Header], site: Path) -> list[dict[str, str]]:
+def facts(headers: Sequence[Header], site: Path) -> list[tuple[str, str]]:
     """What holds when there is no complaint, with how much was looked at."""
     every = [item for h in headers for group in groups(h) for item in group]
     count = {kind: sum(i.kind == kind for i in every) for kind in EXPLAINED}
     members = sum(len(i.members) for i in every)
     links = sum(len(_Page(p).links) for p in site.rglob("*.html"))
     return [
-        {
-            "promise": "Every public function, type, macro, field and enum member of the library and of hal/ has words that say what it is, or a type of the library that does.",
-            "result": f"{len(headers)} headers: {count['function']} functions, {count['struct']} structs, {count['enum']} enums, {members} members, {count['macro']} macros",
-        },
-        {
-            "promise": "Every status that a header names is one of the closed list; every function that returns a status names those it can return, and its code names no other.",
-            "result": f"{sum(len(RETVAL.findall(i.text)) for i in every)} statuses of {sum(i.result == 'hg_status' for i in every)} functions",
-        },
-        {
-            "promise": "Every relative link and anchor of the markdown pages and of the generated ones leads somewhere.",
-            "result": f"{links} links in {len(list(site.rglob('*.html')))} pages",
-        },
+        (
+            "Every public function, type, macro, field and enum member of the library and of hal/ has words that say what it is, or a type of the library that does.",
+            f"{len(headers)} headers: {count['function']} functions, {count['struct']} structs, {count['enum']} enums, {members} members, {count['macro']} macros",
+        ),
+        (
+            "Every status that a header names is one of the closed list; every function that returns a status names those it can return, and its code names no other.",
+            f"{sum(len(RETVAL.findall(i.text)) for i in every)} statuses of {sum(i.result == 'hg_status' for i in every)} functions",
+        ),
+        (
+            "Every relative link and anchor of the markdown pages and of the generated ones leads somewhere.",
+            f"{links} links in {len(list(site.rglob('*.html')))} pages",
+        ),
     ]
 
 

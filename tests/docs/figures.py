@@ -33,6 +33,9 @@ from hullguard.plant.detect import Detector
 from hullguard.report.page import BLUE, GREEN, RC, RED
 from hullguard.report.run_report import write_picture
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
+
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "host_tools" / "pictures"
 PAGES = [ROOT / "host_tools" / "docs" / name for name in ("choosing.md", "guarantee.md")]
@@ -378,9 +381,7 @@ def passed(results: Path) -> None:
     """What the check has shown."""
     promise = "Every picture in host_tools/pictures and every measured table in host_tools/docs is, to the byte, what the commands beside it make."
     result = f"{len(PICTURE)} pictures, {len(TABLES)} tables"
-    results.mkdir(parents=True, exist_ok=True)
-    gate = {"gate": "figures-check", "command": "make figures-check", "promises": [{"promise": promise, "result": result}]}
-    (results / "figures-check.json").write_text(json.dumps(gate, indent=1) + "\n")
+    write_to(results / "figures-check.json", [(promise, result)])
     print(f"  ok  {result} of the documentation are as they were")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import json
 import os
 import re
 import shutil
@@ -18,6 +17,9 @@ from check import complaints, facts
 from headers import Header, Item, Member, groups, headers
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
 
 ROOT = Path(__file__).resolve().parents[2]
 STYLE = Path(__file__).with_name("style.css")
@@ -301,9 +303,7 @@ def main() -> int:
     if wrong:
         print(f"docs: {len(wrong)} complaints", file=sys.stderr)
         return 1
-    results = out.parent / "results"
-    results.mkdir(parents=True, exist_ok=True)
-    (results / "docs.json").write_text(json.dumps({"gate": "docs", "command": "make docs", "promises": facts(site.headers, out)}, indent=1) + "\n")
+    write_to(out.parent / "results" / "docs.json", facts(site.headers, out))
     print(f"  ok  {out}/index.html")
     return 0
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
 
 PROMISES = {
     "garbage": "a node, filter or observer started in memory that holds anything behaves to the bit like one started in zeros",
@@ -21,9 +23,8 @@ def main() -> None:
     promises = []
     for part, promise in PROMISES.items():
         line = next(line for line in (said / part).read_text(encoding="utf-8").splitlines() if line.startswith("  ok  "))
-        promises.append({"promise": promise, "result": line.removeprefix("  ok  ")})
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps({"gate": "flips", "command": "make flips", "promises": promises}, indent=1) + "\n", encoding="utf-8")
+        promises.append((promise, line.removeprefix("  ok  ")))
+    write_to(out, promises)
 
 
 if __name__ == "__main__":

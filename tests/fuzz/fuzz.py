@@ -9,7 +9,6 @@ Inputs are in hex, one a line behind its name, so that a difference can be read.
 """
 
 import argparse
-import json
 import os
 import re
 import shutil
@@ -18,6 +17,9 @@ import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
 
 HERE = Path(__file__).parent
 LEDGER = HERE / "ledger.toml"
@@ -201,21 +203,19 @@ def write_results(build: Path, targets: list[str]) -> None:
         executed = sum(entry.executions for (name, _), entry in ledger.items() if name == target)
         still = sum(entry.open for (name, _), entry in ledger.items() if name == target)
         promises.append(
-            {
-                "promise": f"no input breaks an invariant of the fuzz target {target} (tests/fuzz/INVARIANTS.md)",
-                "result": f"{inputs} inputs of corpus and regressions; {executed} executions in the ledger, {still} findings open",
-            }
+            (
+                f"no input breaks an invariant of the fuzz target {target} (tests/fuzz/INVARIANTS.md)",
+                f"{inputs} inputs of corpus and regressions; {executed} executions in the ledger, {still} findings open",
+            )
         )
     cases = [(name, entry) for (name, engine), entry in sorted(ledger.items()) if engine == "readers"]
     promises.append(
-        {
-            "promise": "a file that is wrong in any way is refused in one line by the host's readers, in bounded time and memory",
-            "result": f"{len(cases)} readers, {sum(entry.executions for _, entry in cases)} cases in the ledger, {sum(entry.open for _, entry in cases)} findings open",
-        }
+        (
+            "a file that is wrong in any way is refused in one line by the host's readers, in bounded time and memory",
+            f"{len(cases)} readers, {sum(entry.executions for _, entry in cases)} cases in the ledger, {sum(entry.open for _, entry in cases)} findings open",
+        )
     )
-    folder = build.parent / "results"
-    folder.mkdir(exist_ok=True)
-    (folder / "fuzz-quick.json").write_text(json.dumps({"gate": "fuzz-quick", "command": "make fuzz-quick", "promises": promises}, indent=1) + "\n")
+    write_to(build.parent / "results" / "fuzz-quick.json", promises)
 
 
 def long(build: Path, targets: list[str], seconds: int, engines: list[str]) -> int:

@@ -10,7 +10,6 @@
 - q31: hg_q31_shift() and with it hg_acc_real() lose half a step at most, by every number of places that a sum is shifted.
 """
 
-import json
 import math
 import re
 import resource
@@ -26,6 +25,9 @@ from hullguard.design.arith import gamma32
 from hullguard.design.tables import FLOAT32, SignalTable, signal_table
 from hullguard.model import load_model
 from hullguard.model.schema import Signal
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 MODELS = ("platoon", "platoon_bank", "suspension", "suspension_published", "two_state", "quadratic_sensor", "battery_cell", "cubic_suspension")
@@ -140,12 +142,7 @@ def main() -> int:
     dots, moved = [n for n in names if n.startswith("dot")], [n for n in names if n.startswith("q31")]
     ranges = len(names) - len(dots) - len(moved)
     text = f"{len(items)} scripts: sums of products of {len(dots)} shipped lengths, up to {lengths()[-1]} terms; {ranges} ranges of signals; {len(moved)} shifts"
-    promise = {
-        "promise": "The bounds of rounding that the design adds to thresholds and radii are not below what the arithmetic of the C code can lose",
-        "result": text,
-    }
-    result.parent.mkdir(parents=True, exist_ok=True)
-    result.write_text(json.dumps({"gate": "gappa", "command": "make gappa", "promises": [promise]}, indent=1) + "\n")
+    write_to(result, [("The bounds of rounding that the design adds to thresholds and radii are not below what the arithmetic of the C code can lose", text)])
     print(f"  ok  gappa: {text}")
     return 0
 

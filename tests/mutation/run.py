@@ -7,7 +7,6 @@ an error unless equivalent.toml explains it, and so is an entry there that expla
 """
 
 import argparse
-import json
 import os
 import random
 import re
@@ -18,6 +17,9 @@ import time
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
 
 try:
     from mutate import Mutant, Mutator
@@ -256,12 +258,10 @@ def main() -> int:
 def write_results(path: Path, made: int, survived: int, modules: list[str], table: Table) -> None:
     """What holds, for the page of promises."""
     complete = [module for module in modules if module not in table.unfinished]
-    promise = f"a fault put into one of these files is noticed by a unit test, or explained as none: {', '.join(complete)}"
+    promise = "a fault put into a finished file of the library is noticed by a unit test, or explained as none"
     pending = ", ".join([f"{module} {count}" for module, count in sorted(table.pending.items())] + [f"{module} (not counted)" for module in sorted(table.unmeasured)])
-    result = f"{made} faults made, {survived} survive, each explained, but for files that are not finished, with their unexplained survivors: {pending or 'none'}"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    gate = {"gate": path.stem, "command": f"make {path.stem}", "promises": [{"promise": promise, "result": result}]}
-    path.write_text(json.dumps(gate, indent=1) + "\n", encoding="utf-8")
+    result = f"{made} faults made in {', '.join(complete)}; {survived} survive, each explained; not finished, with their unexplained survivors: {pending or 'none'}"
+    write_to(path, [(promise, result)])
 
 
 if __name__ == "__main__":

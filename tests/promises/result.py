@@ -17,13 +17,18 @@ Said = tuple[str, str]
 
 def write(gate: str, said: list[Said], command: str = "") -> None:
     """Leave what `gate` (a make target, run by `command`) promises in $BUILD/results (build/results), in place of what it said before."""
+    write_to(Path(os.environ.get("BUILD", "build")) / "results" / f"{gate}.json", said, command)
+
+
+def write_to(file: Path, said: list[Said], command: str = "") -> None:
+    """The same in a file that is named after the gate."""
+    gate = file.stem
     for promise, result in said:
         if not promise.strip() or not result.strip() or "\n" in promise + result or "|" in promise + result:
             sys.exit(f"result.py: {gate}: a promise and its result are one line each, not empty and without |: {promise!r}, {result!r}")
-    folder = Path(os.environ.get("BUILD", "build")) / "results"
-    folder.mkdir(parents=True, exist_ok=True)
+    file.parent.mkdir(parents=True, exist_ok=True)
     found = {"gate": gate, "command": command or f"make {gate}", "promises": [{"promise": p, "result": r} for p, r in said]}
-    (folder / f"{gate}.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    file.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

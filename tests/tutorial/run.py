@@ -8,7 +8,6 @@ are run only where there is nothing yet: with --root, inside that root, as make 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import shlex
@@ -18,6 +17,9 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
 
 ROOT = Path(__file__).resolve().parents[2]
 TUTORIAL = ROOT / "host_tools" / "docs" / "tutorial.md"
@@ -142,9 +144,7 @@ def main() -> int:
         print(line, file=sys.stderr)
     if not wrong and args.results:
         compared = sum(len([x for x in s.shown if x.strip() != ".."]) for s in wanted)
-        promise = {"promise": "The tutorial, followed to the letter, says what it shows.", "result": f"{len(wanted)} blocks run, {compared} lines compared"}
-        args.results.parent.mkdir(parents=True, exist_ok=True)
-        args.results.write_text(json.dumps({"gate": "tutorial", "command": "make tutorial", "promises": [promise]}, indent=1) + "\n", encoding="utf-8")
+        write_to(args.results, [("The tutorial, followed to the letter, says what it shows.", f"{len(wanted)} blocks run, {compared} lines compared")])
     return 1 if wrong else 0
 
 

@@ -18,6 +18,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
+from result import write_to
+
 FILES = "firmware/include/", "firmware/src/"
 Place = tuple[str, int, int, int, int]  # file, line and column of the first character, of the one behind the last
 
@@ -141,9 +144,7 @@ def main() -> int:
         print(f"coverage: {result}")
         if arguments.results:
             promise = "every line, branch and condition (MC/DC) of the library is covered by its unit tests"
-            arguments.results.parent.mkdir(parents=True, exist_ok=True)
-            gate = {"gate": "coverage", "command": "make coverage", "promises": [{"promise": promise, "result": result}]}
-            arguments.results.write_text(json.dumps(gate, indent=1) + "\n", encoding="utf-8")
+            write_to(arguments.results, [(promise, result)])
     return 1 if faults else 0
 
 
