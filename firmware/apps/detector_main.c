@@ -1,8 +1,10 @@
 /** @file
  *  A detector node on a board without an operating system: model platoon over hal.h, for ever. Another model is another header and name here;
- *  another board another backend to link with. detector_node.c is the same with options and reports for people. */
+ *  another board another backend to link with. The node's memory is sealed while the processor waits. detector_node.c is the same with options and reports for
+ *  people. */
 
 #include "bare.h"
+#include "hullguard/guard.h"
 #include "platoon.h"
 
 #define PERIOD_US HG_PLATOON_SAMPLE_TIME_US
@@ -11,6 +13,7 @@
 
 typedef struct {
     hg_platoon_node detector;
+    hg_guard        guard;
     hg_hal          board;
     uint64_t        deadline_us; /* of the next closing frame; a bus that stays silent from the start is reported, too */
     uint64_t        closing_us;  /* when the last one came */
@@ -74,6 +77,17 @@ static void look_at_deadline(app *self)
     }
 }
 
+/* Wait with the node's memory sealed; one that is not as it was left is started anew, while the plant goes on. */
+static bool waited(app *self)
+{
+    uint8_t *const memory = (uint8_t *)&self->detector;
+    (void)hg_guard_seal(&self->guard, memory, sizeof(self->detector));
+    if (hg_hal_wait(&self->board, self->deadline_us) == HG_E_IO) {
+        return false;
+    }
+    return (hg_guard_check(&self->guard, memory, sizeof(self->detector)) == HG_OK) || (hg_platoon_node_start(&self->detector, HG_START_MOVING) == HG_OK);
+}
+
 int main(void)
 {
     static app self;
@@ -83,7 +97,7 @@ int main(void)
         return 1;
     }
     self.deadline_us = hg_hal_now_us(&self.board) + PERIOD_US + SLACK_US;
-    while (hg_hal_wait(&self.board, self.deadline_us) != HG_E_IO) {
+    while (waited(&self)) {
         while (hg_hal_receive(&self.board, &frame, &at_us) == HG_OK) {
             take_frame(&self, &frame, at_us);
         }

@@ -4,13 +4,18 @@
  *      harmless   every verdict and every answer is the same
  *      detected   something else than the plant shows it: bus health, refused, STARTING, another sample, another answer of a call
  *      recovered  nothing shows it, and the verdicts are the same again at most BOUND samples later
- *      lasting    nothing shows it, and they are not: an alarm suppressed, a false one, or other candidates */
+ *      lasting    nothing shows it, and they are not: an alarm suppressed, a false one, or other candidates
+ *
+ * Then the same with the memory sealed between two calls (guard.h), and whatever MASK says: how many flips were made, of memory and seal, and how many of them
+ * the guard did not find; and from every call on, started anew: after how many samples at most the verdicts are the usual ones, and false alarms. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include FLIPS_HEADER
+
+#include "hullguard/guard.h"
 
 #define OPERATIONS_MAX 2048U
 
@@ -104,6 +109,45 @@ static unsigned judge(size_t from, unsigned bound)
     return kind;
 }
 
+static bool found(const hg_guard *guard)
+{
+    return hg_guard_check(guard, (const uint8_t *)&storage, sizeof(storage)) == HG_E_DIGEST;
+}
+
+static void guarded(size_t from, unsigned long *flips, unsigned long *missed)
+{
+    hg_guard guard;
+    storage = before[from];
+    if (hg_guard_seal(&guard, (const uint8_t *)&storage, sizeof(storage)) != HG_OK) {
+        exit(3);
+    }
+    for (size_t place = 0U; place < (sizeof(storage) + sizeof(guard)); place++) {
+        uint8_t *const byte = (place < sizeof(storage)) ? ((uint8_t *)&storage + place) : ((uint8_t *)&guard + (place - sizeof(storage)));
+        for (unsigned bit = 0U; bit < 8U; bit++) {
+            *byte ^= (uint8_t)(1U << bit);
+            (*flips)++;
+            *missed += found(&guard) ? 0U : 1U;
+            *byte ^= (uint8_t)(1U << bit);
+        }
+    }
+    *missed += found(&guard) ? 1U : 0U; /* of the memory as it was */
+}
+
+/* A new start before operation `from`, while the plant moves: samples until the plant's verdict is the usual one for good. */
+static unsigned restarted(size_t from, unsigned long *false_alarms)
+{
+    unsigned last = 0U;
+    if (FLIPS_START(&storage, HG_START_MOVING) != HG_OK) {
+        exit(3);
+    }
+    for (size_t i = from; i < length; i++) {
+        const answer now = perform(&run[i]);
+        *false_alarms += (alarm(&now) && (!alarm(&usual[i]))) ? 1U : 0U;
+        last = (now.verdict.plant != usual[i].verdict.plant) ? ((unsigned)run[i].sample - run[from].sample + 1U) : last;
+    }
+    return last;
+}
+
 static void record(void)
 {
     (void)memset(&storage, 0, sizeof(storage));
@@ -153,6 +197,16 @@ int main(int argc, char **argv)
             }
         }
     }
+    unsigned long flips = 0U;
+    unsigned long missed = 0U;
+    unsigned long false_alarms = 0U;
+    unsigned      longest = 0U;
+    for (size_t i = first; (i <= last) && (i < length); i += stride) {
+        guarded(i, &flips, &missed);
+        const unsigned samples = restarted(i, &false_alarms);
+        longest = (samples > longest) ? samples : longest;
+    }
+    (void)printf("guard %lu %lu %u %lu\n", flips, missed, longest, false_alarms);
     for (size_t place = 0U; place < sizeof(storage); place++) {
         if (mask[place] != 0U) {
             (void)printf("%zu %u %u %u %u %u %u\n", place, counts[place][HARMLESS], counts[place][DETECTED], counts[place][RECOVERED], counts[place][FALSE_ALARM],

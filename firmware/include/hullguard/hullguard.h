@@ -34,6 +34,7 @@
 #include "hullguard/node.h"
 #include "hullguard/digest.h"
 #include "hullguard/selftest.h"
+#include "hullguard/guard.h"
 #include "hullguard/tracker.h"
 #include "hullguard/digest_tracker.h"
 #include "hullguard/digest_uio.h"

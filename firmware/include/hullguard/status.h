@@ -26,7 +26,7 @@ typedef enum {
     HG_E_IO         = -13, /* the operating system or the controller refused; the backend's state says more */
     HG_E_SEQUENCE   = -14, /* the sequence counter jumped further than the sender can have counted */
     HG_E_STATE      = -15, /* a good frame of a link that has had too many bad ones to be trusted yet, or a request that does not fit the state */
-    HG_E_DIGEST     = -16, /* constant tables are not as they were generated: their checksum is wrong (digest.h) */
+    HG_E_DIGEST     = -16, /* a checksum is wrong: constant tables are not as they were generated (digest.h), or memory is not as it was sealed (guard.h) */
     HG_E_SELFTEST   = -17  /* the self-test's result is not the stored one: tables, code or processor are not as they were (selftest.h) */
 } hg_status;
 

@@ -75,7 +75,7 @@ def unit_of(name: str) -> str:
 # The library's own headers: hg_NAME_config and NAME.h of a model that is called like one would be declared twice.
 LIBRARY = frozenset(
     {
-        *("bank", "can", "code", "config", "consistency", "crc32c", "decision", "detector", "digest", "digest_tracker", "digest_uio", "e2e", "frame", "freeze", "fusion"),
+        *("bank", "can", "code", "config", "consistency", "crc32c", "decision", "detector", "digest", "digest_tracker", "digest_uio", "e2e", "frame", "freeze", "fusion", "guard"),
         *("hold", "hull", "hullguard", "isolate", "linalg"),
         *("mismatch", "node", "polynomial", "predict", "real", "residual", "ring", "selftest", "statistic", "status", "tracker", "trigger", "uio", "variance", "zonotope"),
     }
