@@ -8,7 +8,7 @@
 #define WORD_BITS 32U
 
 /* Not zero: a seal that was never made does not fit a memory that was never written. */
-#define START 0x9E3779B9UL
+#define START ((uint32_t)0x9E3779B9UL)
 
 static bool here(const hg_guard *self, const uint8_t *memory, uint32_t bytes)
 {
@@ -34,7 +34,7 @@ static uint32_t sum_of(const uint8_t *memory, uint32_t bytes)
     for (; (bytes - at) >= WORD_BYTES; at += WORD_BYTES) {
         sum = joined(sum, word_at(&memory[at]));
     }
-    uint8_t rest[WORD_BYTES] = {0U};
+    uint8_t rest[WORD_BYTES] = {0U, 0U, 0U, 0U};
     for (uint32_t i = 0U; (at + i) < bytes; i++) {
         rest[i] = memory[at + i];
     }

@@ -12,5 +12,6 @@ deviations: ## write the table of deviations from MISRA anew, where their number
 	@$(PY) tests/lint/deviations.py table --write tests/lint/DEVIATIONS.md $(BUILD)/lint/misra $(BUILD)/lint/hal
 
 .PHONY: tidy
-tidy: ## clang-tidy and gcc -fanalyzer over library, HAL and applications
-	@tests/lint/tidy.sh $(BUILD)/results/tidy.json
+CHECK_PARTS += tidy
+tidy: ## clang-tidy and gcc -fanalyzer over library, HAL and applications (TIDY=file: of one)
+	@BUILD=$(BUILD) TIDY=$(TIDY) tests/lint/tidy.sh
