@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 
 import numpy as np
 
 from hullguard.campaign.case import COLUMNS, Case, Rows, chunk, runs_a_chunk
 from hullguard.campaign.chunks import Chunks
-from hullguard.campaign.tasks import deaf, stop
+from hullguard.campaign.tasks import crew, deaf
 
 
 @dataclass(frozen=True)
@@ -40,16 +39,12 @@ def processes(workers: int) -> Way:
         if workers <= 1 or len(tasks) <= 1:
             yield from serial(tasks)
             return
-        with ProcessPoolExecutor(min(workers, len(tasks)), mp_context=multiprocessing.get_context("spawn")) as pool:
-            try:
-                with deaf():  # each of the first tasks starts a worker
-                    waiting = {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[:workers]}
-                waiting |= {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[workers:]}
-                for done in as_completed(waiting):
-                    yield waiting[done], done.result()
-            except BaseException:
-                stop(pool)
-                raise
+        with crew(min(workers, len(tasks))) as pool:
+            with deaf():  # each of the first tasks starts a worker
+                waiting = {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[:workers]}
+            waiting |= {pool.submit(chunk, t.case, t.first, t.count): t for t in tasks[workers:]}
+            for done in as_completed(waiting):
+                yield waiting[done], done.result()
 
     return work
 

@@ -65,11 +65,17 @@ def deaf() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def stop(pool: ProcessPoolExecutor) -> None:
-    """End a pool at once: what its workers have begun may take them a minute more, and nobody waits for it."""
-    for child in multiprocessing.active_children():
-        child.terminate()
-    pool.shutdown(cancel_futures=True)
+@contextlib.contextmanager
+def crew(count: int, initializer: Callable[..., None] | None = None, initargs: tuple[Any, ...] = ()) -> Iterator[ProcessPoolExecutor]:
+    """Worker processes of their own interpreter. Where the block breaks off they end at once: what they have begun may take them a minute more, and nobody waits for it."""
+    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=initializer, initargs=initargs) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for child in multiprocessing.active_children():
+                child.terminate()
+            pool.shutdown(cancel_futures=True)
+            raise
 
 
 def _enter(begin: Callable[[Any], Any], job: Any) -> None:
@@ -88,14 +94,10 @@ def each(begin: Callable[[Job], Context], work: Callable[[Context, Item], Result
             results.append(work(made, item))
             tick(1)
         return results
-    with ProcessPoolExecutor(min(workers, len(items)), mp_context=multiprocessing.get_context("spawn"), initializer=_enter, initargs=(begin, job)) as pool:
-        try:
-            with deaf():  # the first tasks start the workers
-                waiting = [pool.submit(_one, work, item) for item in items]
-            for done in as_completed(waiting):
-                done.result()
-                tick(1)
-        except BaseException:
-            stop(pool)
-            raise
+    with crew(min(workers, len(items)), _enter, (begin, job)) as pool:
+        with deaf():  # the first tasks start the workers
+            waiting = [pool.submit(_one, work, item) for item in items]
+        for done in as_completed(waiting):
+            done.result()
+            tick(1)
         return [done.result() for done in waiting]
