@@ -74,7 +74,7 @@ class Mutator:
         for operator, variant in self.variants(node):
             inside = self.choose(node, operator, variant, inside)
         unused = re.fullmatch(r"\(void\)\w+;", self.text(node)) is not None
-        if node.type in {"expression_statement", "break_statement", "continue_statement"} and not unused:
+        if node.type in {"expression_statement", "break_statement", "continue_statement"} and not (unused or self.ends_switch(node)):
             inside = self.delete(node, inside)
         return inside
 
@@ -130,7 +130,8 @@ class Mutator:
             found = self.swapped(node, "assignment", ASSIGNMENT.get(self.operator(node), ()))
         elif node.type == "cast_expression":
             found = self.of_cast(node)
-        return found + self.of_place(node)
+        text = self.text(node)
+        return [(operator, variant) for operator, variant in found + self.of_place(node) if variant != text]
 
     def of_binary(self, node: Node) -> list[tuple[str, str]]:
         sign = self.operator(node)
@@ -194,6 +195,11 @@ class Mutator:
         if self.returns in {"*", "void"} or (self.returns[:3] == "hg_" and self.returns not in {"hg_real", "hg_acc"}):
             return []
         return [("result", f"({text}) + 1"), ("result", "0")]
+
+    def ends_switch(self, node: Node) -> bool:
+        """Is it a break behind which the switch ends anyway?"""
+        case = node.parent
+        return node.type == "break_statement" and case is not None and case.type == "case_statement" and not (node.next_named_sibling or case.next_named_sibling)
 
     def is_condition(self, node: Node) -> bool:
         parent = node.parent

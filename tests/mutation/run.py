@@ -190,13 +190,15 @@ class Table:
 
     @classmethod
     def read(cls, path: Path) -> "Table":
-        """Read the table; an entry has module, function, operator, original, mutated and why."""
+        """Read the table; an entry has module, function, operator, original, mutated (one line, or a list of those with the same reason) and why."""
         text = tomllib.loads(path.read_text(encoding="utf-8"))
-        names = ("module", "function", "operator", "original", "mutated")
         reasons: dict[Key, str] = {}
         for entry in text.get("equivalent", []):
-            module, function, operator, original, mutated = (entry[name] for name in names)
-            reasons[(module, function, operator, original, mutated)] = entry["why"]
+            module, function, operator, original = (entry[name] for name in ("module", "function", "operator", "original"))
+            lines = entry["mutated"] if isinstance(entry["mutated"], list) else [entry["mutated"]]
+            if not lines:
+                sys.exit(f"{path}: an entry of {module}, {function}() names no mutant: {original}")
+            reasons |= dict.fromkeys(((module, function, operator, original, line) for line in lines), entry["why"])
         return cls(reasons, dict(text.get("pending", {})), set(text.get("unmeasured", [])))
 
 

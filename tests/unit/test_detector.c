@@ -313,6 +313,10 @@ static void a_fault_is_confirmed_with_its_candidates(void **state)
     give(&r, 0U, 100, 200, true);
     give(&r, 1U, 100, 0, true);
     assert_int_equal(HG_PLANT_NONE, step(&r)); /* three quiet samples */
+    give(&r, 0U, 100, 300, true);
+    give(&r, 1U, 100, 0, true);
+    assert_int_equal(HG_PLANT_CONFIRMED, step(&r)); /* of generator 1 alone; it rests on bounds too (step() looks) */
+    assert_int_equal(0x2, r.finding.candidates);
 }
 
 static void a_lost_frame_takes_a_provisional_alarm_back(void **state)
@@ -358,6 +362,7 @@ static void a_moving_start_shows_until_it_has_settled(void **state)
     assert_int_equal(HG_PLANT_STARTING, step(&r));
     assert_real(SM_SLEW(1), r.self.radius[0]); /* what the holds know stays */
     assert_real(64.0 + (0.25 + SM_HALF) + SM_HALF, r.self.J[0]);
+    assert_real(100.0 * SM_RESOLUTION, r.self.r[1]); /* no value from before it is left */
 }
 
 static void restart_forgets_alarms(void **state)

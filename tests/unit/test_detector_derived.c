@@ -144,6 +144,7 @@ static hg_plant step(rig *r)
 {
     (void)memset(&r->finding, 0x5A, sizeof(r->finding));
     assert_status(HG_OK, hg_detector_step(&r->self, &r->finding));
+    assert_int_equal(HG_BASIS_SET, r->finding.basis);
     check_canaries(r);
     return r->finding.plant;
 }
@@ -487,10 +488,12 @@ static void a_prediction_that_is_wider_than_what_was_lost_stays(void **state)
     begin(&r, &c);
     two_silent(&r);
     hg_ring_row(&r.self.radii, 0U)[3] = R(7); /* as if the prediction had been that wide */
+    hg_ring_row(&r.self.radii, 0U)[4] = R(9);
     give(&r, 0U, 16, 0, false);
     (void)silent(&r, 32);
     assert_real(7.0, past(&r, 1U, 3U));
-    assert_real(SLEW(2), past(&r, 1U, 4U));
+    assert_real(9.0, past(&r, 1U, 4U));
+    assert_real(SLEW(1), past(&r, 2U, 4U));
 }
 
 /* Group 1 is behind group 0 in the vector, and has no predictor. */

@@ -356,6 +356,24 @@ static void the_protection_writes_where_it_owns_and_nowhere_else(void **state)
     }
 }
 
+/* HG_E2E_NO_STAMP is no place: not even the one that its number would be, far behind the frame. */
+static void without_a_place_for_a_stamp_none_is_written_or_read(void **state)
+{
+    (void)state;
+    static uint8_t data[(HG_E2E_NO_STAMP / 8U) + 1U];
+    for (size_t kind = 0U; kind < COUNT(kinds); kind++) {
+        const hg_e2e_config c = usual(kinds[kind].profile, kinds[kind].mode);
+        hg_e2e_header header = {.stamp = 0x5AU, .counter = 0x5AU, .crc = 0x5A5AU};
+        (void)memset(data, 0xFF, sizeof(data));
+        assert_status(HG_OK, hg_e2e_protect(&c, data, 8U, 1U, 0U));
+        assert_status(HG_OK, hg_e2e_check(&c, data, 8U, &header));
+        assert_count(0U, header.stamp);
+        for (size_t i = 8U; i < sizeof(data); i++) {
+            assert_int_equal(0xFF, data[i]);
+        }
+    }
+}
+
 static void the_counter_has_its_modulus(void **state)
 {
     (void)state;
@@ -1034,6 +1052,7 @@ int main(void)
         cmocka_unit_test(examples_of_the_standard_come_out),
         cmocka_unit_test(every_layout_agrees_with_the_references),
         cmocka_unit_test(the_protection_writes_where_it_owns_and_nowhere_else),
+        cmocka_unit_test(without_a_place_for_a_stamp_none_is_written_or_read),
         cmocka_unit_test(the_counter_has_its_modulus),
         cmocka_unit_test(frames_too_short_for_a_place_or_too_long_are_refused),
         cmocka_unit_test(only_the_right_checksum_is_good),

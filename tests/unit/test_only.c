@@ -193,6 +193,32 @@ static void a_plant_at_rest_raises_no_alarm_and_a_fault_does(void **state)
     assert_int_equal(HG_PLANT_CONFIRMED, found);
 }
 
+/* A group has as many signals as a group can have here. */
+static void frames_of_the_widest_groups_are_received(void **state)
+{
+    (void)state;
+    const hg_node_config *config = &hg_platoon_bank_config;
+    const int32_t code[HG_GROUP_SIGNALS_MAX] = {0};
+    assert_status(HG_OK, hg_platoon_bank_node_start(&node, HG_START_REST));
+    for (uint8_t k = 0U; k < 20U; k++) {
+        hg_verdict verdict;
+        for (uint8_t group = 0U; group < HG_PLATOON_BANK_GROUPS; group++) {
+            const hg_message *message = &config->message[group];
+            hg_can_frame frame;
+            assert_count(HG_GROUP_SIGNALS_MAX, message->width);
+            hg_frame_pack(message, code, &frame);
+            assert_status(HG_OK, hg_e2e_protect(message->e2e, frame.data, frame.length, (uint8_t)(k % hg_e2e_modulus(message->e2e)), k & 15U));
+            assert_status(HG_OK, hg_node_receive(&node.node, &frame));
+        }
+        assert_status(HG_OK, hg_node_step(&node.node, &verdict));
+        assert_count(k, verdict.k);
+    }
+    for (uint8_t group = 0U; group < HG_PLATOON_BANK_GROUPS; group++) {
+        assert_int_equal(20, hg_node_health(&node.node, group)->good);
+        assert_int_equal(0, hg_node_health(&node.node, group)->invalid);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -202,6 +228,7 @@ int main(void)
         cmocka_unit_test(another_count_is_refused_by_the_detector),
         cmocka_unit_test(another_order_is_refused),
         cmocka_unit_test(a_residual_reads_the_signals_where_they_are),
+        cmocka_unit_test(frames_of_the_widest_groups_are_received),
         cmocka_unit_test(a_plant_at_rest_raises_no_alarm_and_a_fault_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
