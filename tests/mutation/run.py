@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -130,10 +131,13 @@ class Builder:
         return numbers
 
 
-def programs_of(folder: Path, module: str) -> list[Path]:
-    """The test programs of a build; those that are named after the module first."""
-    programs = [path for path in folder.glob("test_*") if os.access(path, os.X_OK) and not path.suffix and path.name not in CAMPAIGNS]
-    return sorted(programs, key=lambda path: (not path.name.startswith(f"test_{module}"), path.name))
+def programs_of(folder: Path, module: str, library: Path) -> Iterator[tuple[Program, set[int], float]]:
+    """The test programs of a build, each with the mutants that it comes by and its time: those that are named after the module first, the quickest of them ahead."""
+    paths = sorted(path for path in folder.glob("test_*") if os.access(path, os.X_OK) and not path.suffix and path.name not in CAMPAIGNS)
+    programs = {path: Program(path, library, library.parent) for path in paths}
+    named = [program for path, program in programs.items() if path.name.startswith(f"test_{module}")]
+    yield from sorted(((program, *program.reached()) for program in named), key=lambda found: found[2])
+    yield from ((program, *program.reached()) for program in programs.values() if program not in named)
 
 
 def judge(builder: Builder, source: Path, chosen: set[Key] | None) -> Verdicts:
@@ -144,15 +148,13 @@ def judge(builder: Builder, source: Path, chosen: set[Key] | None) -> Verdicts:
         there = builder.compiled(library.parent / source.name, build) - left_out
         numbers = {mutant.number: mutant for mutant in mutator.mutants if mutant.number in there and (chosen is None or mutant.key in chosen)}
         verdicts.mutants |= numbers
-        for path in programs_of(builder.folder / build, source.stem):
+        for program, reached, seconds in programs_of(builder.folder / build, source.stem, library):
             alive = {number for number in numbers if number not in verdicts.killer}
-            if not alive:
-                break
-            program = Program(path, library, library.parent)
-            reached, seconds = program.reached()
             if alive & reached:
                 killed = program.killed(alive & reached, seconds)
-                verdicts.killer |= dict.fromkeys(killed, f"{build}/{path.name}")
+                verdicts.killer |= dict.fromkeys(killed, f"{build}/{program.path.name}")
+            if alive <= verdicts.killer.keys():
+                break
     return verdicts
 
 

@@ -9,6 +9,7 @@
 #include "small_model.h"
 
 #define SAMPLES 6U
+#define MANY 60U /* samples of a longer record */
 #define AFTER 2U
 #define BURST 3U
 #define HASH 0x12345678UL
@@ -32,14 +33,15 @@ typedef struct {
     hg_detector        detector;   /* its numbers alone are read */
     hg_detector_config config;
     hg_real            value[SM_SIGNALS], radius[SM_SIGNALS], r[2], J[2];
-    hg_freeze_row      row[SAMPLES + 1U];
-    hg_real            real[(SAMPLES * REALS) + 1U];
+    hg_freeze_row      row[MANY + 1U];
+    hg_real            real[(MANY * REALS) + 1U];
     hg_freeze_memory   memory;
     uint32_t           k;
     uint8_t            counter;
+    uint8_t            answers; /* responses so far */
 } rig;
 
-static void begin(rig *g)
+static void begin_with(rig *g, const hg_freeze_config *config)
 {
     (void)memset(g, 0x5A, sizeof(*g));
     g->config = sm_detector;
@@ -52,7 +54,13 @@ static void begin(rig *g)
     g->memory = (hg_freeze_memory){.row = g->row, .real = g->real};
     g->k = 100U;
     g->counter = 0U;
-    assert_status(HG_OK, hg_freeze_start(&g->self, &usual, &g->memory, &g->detector, HASH));
+    g->answers = 0U;
+    assert_status(HG_OK, hg_freeze_start(&g->self, config, &g->memory, &g->detector, HASH));
+}
+
+static void begin(rig *g)
+{
+    begin_with(g, &usual);
 }
 
 /* Numbers that say which they are. */
@@ -73,7 +81,7 @@ static void sample(rig *g, hg_plant plant)
     }
     const hg_freeze_row row = {.k = g->k, .candidates = g->k ^ 0xF0U, .bus = 0x1234U, .plant = plant, .basis = HG_BASIS_SET};
     hg_freeze_step(&g->self, &row);
-    assert_untouched(&g->real[SAMPLES * REALS], 1U);
+    assert_untouched(&g->real[g->self.config->samples * REALS], 1U);
     g->k++;
 }
 
@@ -104,7 +112,7 @@ static hg_status ask(rig *g, uint8_t command, uint8_t record, uint32_t first, ui
     return hg_freeze_receive(&g->self, &frame);
 }
 
-/* The next response: its place, and its word. */
+/* The next response: its place, and its word. Each has its own counter, and nothing stands behind its end. */
 static uint32_t response(rig *g, uint32_t *word)
 {
     hg_can_frame frame;
@@ -113,6 +121,11 @@ static uint32_t response(rig *g, uint32_t *word)
     assert_true((frame.id == 0x301U) && (frame.length == 8U) && (frame.flags == 0U));
     assert_status(HG_OK, hg_e2e_check(&rules[1], frame.data, 8U, &header));
     assert_count((g->k - 1U) & 15U, header.stamp);
+    assert_count(g->answers & 15U, header.counter);
+    g->answers++;
+    for (size_t i = 8U; i < HG_CAN_DATA_MAX; i++) {
+        assert_int_equal(0, frame.data[i]);
+    }
     *word = frame.data[4] | ((uint32_t)frame.data[5] << 8U) | ((uint32_t)frame.data[6] << 16U) | ((uint32_t)frame.data[7] << 24U);
     return frame.data[2] | ((uint32_t)frame.data[3] << 8U);
 }
@@ -177,6 +190,9 @@ static void a_start_refuses_numbers_and_messages(void **state)
     c = usual;
     c.burst = 0U;
     assert_status(HG_E_CONFIG, start_with(&c));
+    c = usual;
+    c.burst = 1U;
+    assert_status(HG_OK, start_with(&c));
     const hg_field field = {32U, 16U, HG_FIELD_SIGNED};
     hg_e2e_config other = rules[0];
     hg_message message = request_message;
@@ -205,9 +221,26 @@ static void a_start_refuses_numbers_and_messages(void **state)
     c = usual;
     c.samples = 255U; /* more words than responses can number */
     assert_status(HG_E_CONFIG, hg_freeze_start(&g.self, &c, &g.memory, &g.detector, HASH));
+    c.samples = 1U;
+    c.after = 0U;
+    const uint32_t most = 65535U - 3U - 1U - 3U; /* of a single sample: without head, checksum, and its own head */
+    g.config.residuals = (uint16_t)((most / (2U * HG_REAL_WORDS)) - 255U);
+    assert_status(HG_OK, hg_freeze_start(&g.self, &c, &g.memory, &g.detector, HASH));
+    g.config.residuals++;
+    assert_status(HG_E_CONFIG, hg_freeze_start(&g.self, &c, &g.memory, &g.detector, HASH));
 }
 
 /* ---- recording ---- */
+
+static void checksum_is_right(const rig *g)
+{
+    const uint32_t last = hg_freeze_words(&g->self) - 1U;
+    uint32_t crc = 0U;
+    for (uint32_t place = 0U; place < last; place++) {
+        crc = hg_crc32c(crc, hg_freeze_word(&g->self, place), 4U);
+    }
+    assert_true(hg_freeze_word(&g->self, last) == crc);
+}
 
 static void a_record_holds_what_was_before_and_after_an_alarm(void **state)
 {
@@ -222,6 +255,7 @@ static void a_record_holds_what_was_before_and_after_an_alarm(void **state)
     for (uint32_t i = 0U; i < SAMPLES; i++) { /* as many steps of the checksum */
         assert_int_equal(HG_FREEZE_CLOSING, g.self.state);
         sample(&g, HG_PLANT_NONE);
+        assert_count((i + 1U) * ROW, g.self.summed); /* of a record of any length as many a sample */
     }
     sample(&g, HG_PLANT_NONE);
     assert_int_equal(HG_FREEZE_FROZEN, g.self.state);
@@ -233,11 +267,7 @@ static void a_record_holds_what_was_before_and_after_an_alarm(void **state)
 #endif
     assert_true(hg_freeze_word(&g.self, 1U) == HASH);
     assert_true(hg_freeze_word(&g.self, 2U) == (SM_SIGNALS | ((SAMPLES - 1U - AFTER) << 8U) | (2U << 16U)));
-    uint32_t crc = 0U;
-    for (uint32_t place = 0U; place < (WORDS - 1U); place++) {
-        crc = hg_crc32c(crc, hg_freeze_word(&g.self, place), 4U);
-    }
-    assert_true(hg_freeze_word(&g.self, WORDS - 1U) == crc);
+    checksum_is_right(&g);
     for (uint32_t i = 0U; i < SAMPLES; i++) {
         const uint32_t k = (alarm + AFTER + 1U + i) - SAMPLES;
         const uint32_t first = 3U + (i * ROW);
@@ -255,15 +285,21 @@ static void a_record_holds_what_was_before_and_after_an_alarm(void **state)
 static void an_alarm_before_the_ring_is_full_is_a_short_record(void **state)
 {
     (void)state;
-    rig g;
-    begin(&g);
-    sample(&g, HG_PLANT_CONFIRMED); /* the first sample there is */
-    samples(&g, AFTER + 3U + 1U, HG_PLANT_CONFIRMED);
-    assert_int_equal(HG_FREEZE_FROZEN, g.self.state);
-    assert_true(hg_freeze_words(&g.self) == (3U + (3U * ROW) + 1U));
-    assert_true((hg_freeze_word(&g.self, 0U) >> 24U) == 3U);
-    assert_true((hg_freeze_word(&g.self, 2U) >> 8U) == (2U << 8U)); /* the alarm is in sample 0 */
-    assert_true(hg_freeze_word(&g.self, 3U) == 100U);
+    for (uint32_t before = 0U; before < (SAMPLES - 1U - AFTER); before++) {
+        rig g;
+        const uint32_t held = before + 1U + AFTER;
+        begin(&g);
+        samples(&g, before, HG_PLANT_NONE);
+        samples(&g, 1U + AFTER + held + 1U, HG_PLANT_CONFIRMED);
+        assert_int_equal(HG_FREEZE_FROZEN, g.self.state);
+        assert_true(hg_freeze_words(&g.self) == (3U + (held * ROW) + 1U));
+        assert_true((hg_freeze_word(&g.self, 0U) >> 24U) == held);
+        assert_true((hg_freeze_word(&g.self, 2U) >> 8U) == ((2U << 8U) | before)); /* the place of the alarm */
+        for (uint32_t i = 0U; i < held; i++) {
+            assert_true(hg_freeze_word(&g.self, 3U + (i * ROW)) == (100U + i));
+        }
+        checksum_is_right(&g);
+    }
 }
 
 static void nothing_but_a_confirmed_alarm_freezes(void **state)
@@ -344,6 +380,36 @@ static void a_part_is_read_and_no_more(void **state)
     }
 }
 
+/* Place and number of words have two bytes each. */
+static void a_part_of_a_long_record_is_read(void **state)
+{
+    (void)state;
+    static rig g;
+    hg_freeze_config c = usual;
+    uint32_t word;
+    c.samples = MANY;
+    c.burst = 255U;
+    begin_with(&g, &c);
+    samples(&g, MANY, HG_PLANT_NONE);
+    samples(&g, 1U + AFTER, HG_PLANT_CONFIRMED);
+    samples(&g, MANY + 1U, HG_PLANT_NONE);
+    const uint32_t words = 3U + (MANY * ROW) + 1U;
+    static const uint32_t parts[][2] = {{258U, 5U}, {3U, 260U}, {513U, 257U}}; /* first, and how many */
+    for (size_t i = 0U; i < COUNT(parts); i++) {
+        assert_status(HG_OK, ask(&g, HG_FREEZE_READ, 1U, parts[i][0], parts[i][1]));
+        state_is(&g, HG_FREEZE_FROZEN, 0U, 1U, words);
+        for (uint32_t n = 0U; n < parts[i][1]; n++) {
+            assert_count(parts[i][0] + n, response(&g, &word));
+            assert_true(word == hg_freeze_word(&g.self, parts[i][0] + n));
+            if (g.self.credit == 0U) {
+                sample(&g, HG_PLANT_NONE);
+            }
+        }
+        nothing_to_send(&g);
+    }
+    assert_count(0U, g.self.refused);
+}
+
 static void what_does_not_fit_the_state_is_answered_and_counted(void **state)
 {
     (void)state;
@@ -390,6 +456,38 @@ static void a_clear_begins_anew(void **state)
     freeze(&g);
     assert_true((hg_freeze_word(&g.self, 0U) >> 16U) == ((SAMPLES << 8U) | 2U));
     assert_true(hg_freeze_word(&g.self, 3U) == (100U + SAMPLES + 1U + AFTER + SAMPLES + 1U + 2U + 40U + 1U + AFTER));
+}
+
+static void after_a_clear_nothing_from_before_it_is_recorded(void **state)
+{
+    (void)state;
+    rig g;
+    begin(&g);
+    freeze(&g);
+    assert_status(HG_OK, ask(&g, HG_FREEZE_CLEAR, 1U, 0U, 0U));
+    state_is(&g, HG_FREEZE_RECORDING, 0U, 1U, 0U);
+    const uint32_t k = g.k;
+    sample(&g, HG_PLANT_CONFIRMED);
+    samples(&g, AFTER + AFTER + 2U, HG_PLANT_CONFIRMED);
+    assert_int_equal(HG_FREEZE_FROZEN, g.self.state);
+    assert_true(hg_freeze_words(&g.self) == (3U + ((1U + AFTER) * ROW) + 1U));
+    assert_true(hg_freeze_word(&g.self, 3U) == k);
+    checksum_is_right(&g);
+}
+
+static void an_extended_request_is_one(void **state)
+{
+    (void)state;
+    rig g;
+    hg_message extended = request_message;
+    hg_freeze_config c = usual;
+    extended.flags = HG_CAN_EXTENDED;
+    c.request = &extended;
+    begin_with(&g, &c);
+    hg_can_frame frame = request_of(&g, HG_FREEZE_STATE, 0U, 0U, 0U);
+    assert_status(HG_E_ID, hg_freeze_receive(&g.self, &frame));
+    frame.flags = HG_CAN_EXTENDED;
+    assert_status(HG_OK, hg_freeze_receive(&g.self, &frame));
 }
 
 static void damaged_and_foreign_frames_are_no_requests(void **state)
@@ -516,8 +614,11 @@ int main(void)
         cmocka_unit_test(a_second_alarm_does_not_overwrite),
         cmocka_unit_test(a_record_is_read_a_few_words_a_sample),
         cmocka_unit_test(a_part_is_read_and_no_more),
+        cmocka_unit_test(a_part_of_a_long_record_is_read),
         cmocka_unit_test(what_does_not_fit_the_state_is_answered_and_counted),
         cmocka_unit_test(a_clear_begins_anew),
+        cmocka_unit_test(after_a_clear_nothing_from_before_it_is_recorded),
+        cmocka_unit_test(an_extended_request_is_one),
         cmocka_unit_test(damaged_and_foreign_frames_are_no_requests),
         cmocka_unit_test(a_node_freezes_what_its_detector_knew),
         cmocka_unit_test(a_node_without_one_knows_no_requests),

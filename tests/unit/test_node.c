@@ -624,7 +624,7 @@ static void a_counter_that_jumped_is_refused_once(void **state)
 static void of_several_silences_the_shortest_counts(void **state)
 {
     (void)state;
-    static const uint8_t silences[2][3] = {{1U, 2U, 9U}, {2U, 1U, 9U}}; /* the last is of no level */
+    static const uint8_t silences[2][3] = {{1U, 2U, 0U}, {2U, 1U, 9U}}; /* the last is of no level */
     for (uint8_t i = 0U; i < 2U; i++) {
         for (uint32_t passed = 1U; passed < 12U; passed++) {
             for (uint32_t moved = 1U; moved < 8U; moved++) {

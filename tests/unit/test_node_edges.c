@@ -211,8 +211,9 @@ static void a_verdict_tells_of_the_groups_that_there_are(void **state)
     (void)state;
     prepare();
     begin();
-    r.holds[SM_GROUPS] = r.holds[0];
     samples(0U, 3U);
+    r.holds[SM_GROUPS] = r.holds[0];
+    samples(3U, 4U);
     assert_int_equal(HG_BUS_GOOD | (HG_BUS_GOOD << 2), r.verdict.bus);
     assert_false(r.verdict.refused);
 }
@@ -429,23 +430,30 @@ static void a_closing_frame_without_a_stamp_is_late_or_begins_anew_by_its_counte
 {
     (void)state;
     for (uint8_t from = 0U; from < 15U; from++) {
-        prepare();
-        r.rule[1] = unstamped_rule;
-        r.counter[1] = from;
-        begin();
-        samples(0U, 5U);
-        lose(1U, 9U);
-        assert_status(HG_E_STAMP, give(1U, 5U, 0, 0));
-        nothing_is_due();
-        assert_status(HG_OK, give(1U, 5U, 0, 0)); /* two that agree: this node has lost the counter */
-        step(5U); /* nobody knows how many samples have passed: the index stays */
-        assert_int_equal(HG_PLANT_STARTING, r.verdict.plant);
-        ticks(6U, 8U);
-        overdue(8U, 9U);
-        assert_status(HG_E_STAMP, give(1U, 8U, 0, 0));
-        assert_status(HG_E_REPEATED, (r.counter[1] = (uint8_t)((r.counter[1] + 14U) % 15U), give(1U, 8U, 0, 0)));
-        tick(9U);
-        assert_int_equal(0, hg_node_health(&r.self, 1U)->lost);
+        for (uint32_t k = 5U; k <= 6U; k++) { /* without a clock, or with one */
+            prepare();
+            r.rule[1] = unstamped_rule;
+            r.counter[1] = from;
+            begin();
+            samples(0U, 5U);
+            overdue(5U, k);
+            lose(1U, 9U);
+            assert_status(HG_E_STAMP, give(1U, 0U, 0, 0));
+            nothing_is_due();
+            const uint32_t open = (k == 5U) ? 5U : 7U;
+            overdue(k, open);
+            assert_status(HG_OK, give(1U, 0U, 0, 0)); /* two that agree: this node has lost the counter */
+            step(open); /* nobody knows how many samples have passed: the index stays */
+            assert_int_equal(HG_PLANT_STARTING, r.verdict.plant);
+            ticks(open + 1U, open + 3U);
+            overdue(open + 3U, open + 4U);
+            const hg_can_frame late = frame_of(1U, 0U, 0, 0);
+            const uint16_t lost = hg_node_health(&r.self, 1U)->lost;
+            assert_status(HG_E_STAMP, hg_node_receive(&r.self, &late));
+            assert_status(HG_E_REPEATED, hg_node_receive(&r.self, &late)); /* it has been received */
+            tick(open + 4U);
+            assert_int_equal(lost, hg_node_health(&r.self, 1U)->lost);
+        }
     }
 }
 

@@ -92,6 +92,10 @@ static void an_alarm_too_soon_or_none_is_no_success(void **state)
     config.code = far;
     result = driven(&config);
     assert_true((!result.quiet) && result.found);
+    for (uint8_t i = 0U; i < HG_PLATOON_GROUPS; i++) {
+        assert_count(30, hg_node_health(&platoon.node, i)->good);
+        assert_count(0, hg_node_health(&platoon.node, i)->invalid);
+    }
     config.digest = result.digest;
     assert_status(HG_E_SELFTEST, tested(&config));
 }
@@ -111,31 +115,61 @@ static void another_table_or_instruction_is_another_digest(void **state)
 
 #define P22(list) {.profile = HG_E2E_P22, .data_ids = (list), .crc = 0U, .counter = 8U, .stamp = 12U, .limits = &hg_e2e_limits_default}
 
-/* A sender that keeps silent for a sample after each frame speaks every second one, and nothing of it counts as lost. */
+static const uint8_t ids[HG_E2E_IDS] = {7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U};
+static const hg_e2e_config rules = P22(ids);
+static const hg_field fields[2] = {{16U, 16U, HG_FIELD_SIGNED}, {32U, 16U, HG_FIELD_SIGNED}};
+static const hg_message own = {.id = 0x200U, .length = 8U, .e2e = &rules};
+static const int32_t still[SM_SIGNALS];
+static const hg_selftest_config drive = {.how = HG_START_REST, .samples = 20U, .fault = 11U, .signal = 0U, .spread = 0U, .size = 2000, .code = still};
+static hg_link link[SM_GROUPS];
+
+/* The small model, or the same with its groups the other way round. */
+static hg_selftest_result driven_small(const uint8_t *silence, uint8_t closing)
+{
+    const uint8_t other = (uint8_t)(1U - closing);
+    hg_message messages[SM_GROUPS];
+    hg_hold_config hold[SM_GROUPS];
+    hg_trigger_config trigger = sm_trigger_a;
+    hg_detector_config detector = sm_detector;
+    messages[other] = (hg_message){.id = 0x101U, .length = 6U, .width = 2U, .field = fields, .scale = sm_scale, .e2e = &rules};
+    messages[closing] = (hg_message){.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .e2e = &rules};
+    hold[other] = sm_hold[0];
+    hold[closing] = sm_hold[1];
+    hold[other].trigger = &trigger;
+    trigger.silence = silence;
+    detector.hold = hold;
+    const hg_node_config config = {.detector = &detector, .message = messages, .closing = closing, .verdict = &own, .status = &own, .heartbeat = 5U};
+    static sm_storage storage;
+    hg_node node;
+    int32_t last[2];
+    hg_selftest_result result;
+    const hg_node_memory memory = {.detector = sm_memory(&storage), .link = link, .closing = last};
+    assert_status(HG_OK, hg_node_start(&node, &config, &memory, HG_START_REST));
+    hg_selftest_drive(&node, &drive, &result);
+    return result;
+}
+
+/* A sender that keeps silent for a sample after each frame speaks every second one, and nothing of it counts as lost or is refused. */
 static void a_silent_sender_is_let_be_silent(void **state)
 {
     (void)state;
-    static const uint8_t ids[HG_E2E_IDS] = {7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U, 7U};
-    static const hg_e2e_config rules = P22(ids);
-    static const hg_field fields[2] = {{16U, 16U, HG_FIELD_SIGNED}, {32U, 16U, HG_FIELD_SIGNED}};
-    static const hg_message messages[SM_GROUPS] = {{.id = 0x101U, .length = 6U, .width = 2U, .field = fields, .scale = sm_scale, .e2e = &rules},
-                                                   {.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .e2e = &rules}};
-    static const hg_message own = {.id = 0x200U, .length = 8U, .e2e = &rules};
-    static const hg_node_config config = {.detector = &sm_detector, .message = messages, .closing = 1U, .verdict = &own, .status = &own, .heartbeat = 5U};
-    static const int32_t still[SM_SIGNALS];
-    static const hg_selftest_config drive = {.how = HG_START_REST, .samples = 20U, .fault = 11U, .signal = 0U, .spread = 0U, .size = 2000, .code = still};
-    static sm_storage storage;
-    hg_node node;
-    hg_link link[SM_GROUPS];
-    int32_t closing[2];
-    hg_selftest_result result;
-    const hg_node_memory memory = {.detector = sm_memory(&storage), .link = link, .closing = closing};
-    assert_status(HG_OK, hg_node_start(&node, &config, &memory, HG_START_REST));
-    hg_selftest_drive(&node, &drive, &result);
-    assert_true(result.quiet && result.found);
-    assert_count(10, link[0].health.good);
-    assert_count(20, link[1].health.good);
-    assert_count(0, link[0].health.lost);
+    static const uint8_t silences[2][3] = {{1U, 0U, 3U}, {0U, 1U, 3U}}; /* the last is of no level */
+    for (size_t i = 0U; i < 2U; i++) {
+        const hg_selftest_result result = driven_small(silences[i], 1U);
+        assert_true(result.quiet && result.found);
+        assert_count(10, link[0].health.good);
+        assert_count(20, link[1].health.good);
+        assert_count(0, link[0].health.lost + link[0].health.sequence + link[0].health.repeated);
+    }
+}
+
+static void who_closes_a_sample_speaks_last(void **state)
+{
+    (void)state;
+    const hg_selftest_result result = driven_small(sm_silence_a, 0U);
+    assert_true(result.quiet);
+    assert_count(20, link[0].health.good);
+    assert_count(10, link[1].health.good);
 }
 
 int main(void)
@@ -146,6 +180,7 @@ int main(void)
         cmocka_unit_test(an_alarm_too_soon_or_none_is_no_success),
         cmocka_unit_test(another_table_or_instruction_is_another_digest),
         cmocka_unit_test(a_silent_sender_is_let_be_silent),
+        cmocka_unit_test(who_closes_a_sample_speaks_last),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
