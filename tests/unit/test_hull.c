@@ -432,7 +432,9 @@ static void modes_need_tables(void **state)
     const hg_real growing[MODES] = {R(0), R(1)};
     const hg_real negative[MODES] = {R(0.5), R(-0.125)};
     const hg_real unknown[MODES] = {R(0.5), REAL_NAN};
-    hg_hull_config c[8];
+    const hg_real first_growing[MODES] = {R(1), R(0.5)};
+    const hg_real first_negative[MODES + 1U] = {R(-0.125), R(0.5), R(0.5)}; /* the last is of no mode */
+    hg_hull_config c[10];
     for (size_t i = 0U; i < COUNT(c); i++) {
         c[i] = with_modes();
     }
@@ -444,6 +446,8 @@ static void modes_need_tables(void **state)
     c[5].mode_decay = growing;
     c[6].mode_decay = negative;
     c[7].mode_decay = unknown;
+    c[8].mode_decay = first_growing;
+    c[9].mode_decay = first_negative;
     for (size_t i = 0U; i < COUNT(c); i++) {
         assert_status(HG_E_CONFIG, hg_hull_start(&self, &c[i], &r.ring, HG_START_REST, memory));
     }
