@@ -38,7 +38,8 @@ static const int32_t sigma_c[] = {2};
 static const hg_trigger_config trigger_c = {.width = 1U, .levels = 1U, .interval_max = 4U, .silence = silence_c, .delta = sm_delta, .sigma = sigma_c,
                                             .activity = sm_zero, .zero = sm_zero};
 static const hg_real slew_c[] = {R(SLEW_C(1)), R(SLEW_C(2)), R(SLEW_C(3)), R(SLEW_C(4)), R(SLEW_C(5)), R(SLEW_C(6))};
-static const hg_real span[16] = {R(94), R(94), R(94), R(SPAN_C), R(94), R(94), R(94), R(94), R(94), R(94), R(94), R(94), R(94), R(94), R(94), R(94)}; /* of all signals, one after another */
+static const hg_real span[16] = {R(94), R(94), R(94), R(SPAN_C), R(94), R(94), R(94), R(94), R(94), R(94), R(94), R(94),
+                                 R(94), R(94), R(94), R(94)}; /* of all signals, one after another, and more behind them */
 static const hg_hold_config hold[GROUPS] = {
     {.trigger = &sm_trigger_a, .margin = 2U, .scale = sm_scale, .half = sm_half, .slew = sm_slew_a, .span = &span[0], .middle = sm_middle},
     {.trigger = &sm_trigger_b, .margin = 3U, .scale = sm_scale, .half = sm_half, .slew = sm_slew_b, .span = &span[2], .middle = sm_middle},
