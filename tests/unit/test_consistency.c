@@ -105,6 +105,25 @@ static void start_tells_null_and_range(void **state)
     assert_status(HG_OK, hg_consistency_start(&p.judge, &least, &p.self, &good));
 }
 
+static void a_start_writes_to_its_own_sensors_only(void **state)
+{
+    (void)state;
+    static rig p;
+    static hg_consistency_sensor many[256]; /* as far as an index of 8 bits goes */
+    for (size_t i = 0U; i < COUNT(many); i++) {
+        many[i] = (hg_consistency_sensor){.score = CANARY, .y = CANARY, .equal = 90U};
+    }
+    begin(&p, &filter, &usual);
+    const hg_consistency_memory memory = {.sum = p.sum, .sensor = many, .real = p.more};
+    assert_status(HG_OK, hg_consistency_start(&p.judge, &usual, &p.self, &memory));
+    for (size_t i = 0U; i < COUNT(many); i++) {
+        const bool own = i < SENSORS;
+        assert_real(own ? 0.0 : (double)CANARY, many[i].score);
+        assert_real(own ? 0.0 : (double)CANARY, many[i].y);
+        assert_count(own ? 0U : 90U, many[i].equal);
+    }
+}
+
 /* The residuals of two filters on the same frames, one with a bias of one sensor from sample 0 on, differ by b rho: c must be the sum of rho^2 / s, and
  * d of the filter with the bias that of the other one plus b c. In the oldest hypothesis, which began with the bias. */
 static void the_response_is_that_of_the_filter(void **state)
@@ -414,6 +433,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null_and_range),
+        cmocka_unit_test(a_start_writes_to_its_own_sensors_only),
         cmocka_unit_test(the_response_is_that_of_the_filter),
         cmocka_unit_test(hypotheses_begin_every_stride),
         cmocka_unit_test(small_biases_are_not_taken_for_larger_ones),

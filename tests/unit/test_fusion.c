@@ -7,14 +7,14 @@
 
 #define STATES 2U
 #define SENSORS 3U
-#define INPUTS 1U
+#define INPUTS 2U
 #define DEPTH 4U
 #define SLOTS (DEPTH + 1U)
 #define RATES 2U
 #define REALS (HG_FUSION_REALS(STATES, INPUTS, SENSORS, DEPTH))
 
 static const hg_real plant_A[STATES * STATES] = {R(1), R(0.125), R(0), R(1)};
-static const hg_real plant_B[STATES * INPUTS] = {R(0), R(1)};
+static const hg_real plant_B[STATES * INPUTS] = {R(0), R(0.5), R(1), R(-0.25)};
 static const hg_real plant_Q[STATES * STATES] = {R(0), R(0), R(0), R(0.015625)};
 static const hg_real plant_x0[STATES] = {R(0), R(1)};
 static const hg_real plant_P0[STATES * STATES] = {R(4), R(0), R(0), R(1)};
@@ -40,11 +40,11 @@ typedef struct {
     hg_fusion_entry  entry[SLOTS * SENSORS];
     hg_fusion_sensor sensor[SENSORS];
     hg_fusion_record record[SENSORS];
-    int32_t          origin[STATES];
+    int32_t          origin[STATES + 1U]; /* one more, for the canary */
     hg_real          real[REALS + 1U];
 } rig;
 
-static const hg_real rest[INPUTS] = {R(0)};
+static const hg_real rest[INPUTS] = {R(0), R(0)};
 
 static hg_fusion_memory memory_of(rig *p)
 {
@@ -60,6 +60,7 @@ static void begin(rig *p, const hg_fusion_config *config)
     const hg_fusion_memory memory = memory_of(p);
     assert_status(HG_OK, hg_fusion_start(&p->self, config, &memory));
     assert_untouched(&p->real[reals], 1U);
+    assert_int_equal(CANARY_CODE, p->origin[config->states]);
 }
 
 static void open(rig *p)
@@ -118,7 +119,10 @@ static void validity_looks_at_every_number_and_table(void **state)
     static const hg_fusion_table no_level[1] = {{.alive = 7U, .level = NULL, .relax = relaxes, .early = earlies}};
     static const hg_fusion_table no_relax[1] = {{.alive = 7U, .level = levels, .relax = NULL, .early = earlies}};
     static const hg_fusion_table no_early[1] = {{.alive = 7U, .level = levels, .relax = relaxes, .early = NULL}};
-    hg_fusion_config c[44];
+    static const hg_fusion_table second[2] = {{.alive = 7U, .level = levels, .relax = relaxes, .early = earlies}, {.alive = 6U, .level = levels, .relax = NULL, .early = earlies}};
+    static const hg_real small_steps[STATES] = {R(0), R(0.5)};
+    static const hg_real coupled[STATES * STATES] = {R(1), R(0), R(0.5), R(1)};
+    hg_fusion_config c[42];
     for (size_t i = 0U; i < COUNT(c); i++) {
         c[i] = usual;
     }
@@ -165,22 +169,62 @@ static void validity_looks_at_every_number_and_table(void **state)
     c[36].origin = first;
     c[36].A = turned;
     c[37].rate_step = REAL_NAN;
-    for (size_t i = 0U; i < 38U; i++) {
+    c[38].table = second;
+    c[39].origin = small_steps;
+    c[40].origin = first;
+    c[40].A = coupled;
+    c[41].states = 0U;
+    c[41].select = NULL;
+    c[41].C = rows;
+    for (size_t i = 0U; i < COUNT(c); i++) {
         assert_false(hg_fusion_valid(&c[i]));
     }
     static rig p;
     const hg_fusion_memory memory = memory_of(&p);
     assert_status(HG_E_CONFIG, hg_fusion_start(&p.self, &c[0], &memory));
-    c[38].inputs = 0U;
-    c[38].B = NULL;
-    c[39].select = NULL;
-    c[39].C = rows;
-    c[40].tables = 1U;
-    c[40].table = no_early; /* without delay nobody reads it */
-    c[41].origin = first;
-    c[42].watchdog = 254U;
-    c[43].heartbeat = 9U;
-    for (size_t i = 38U; i < COUNT(c); i++) {
+}
+
+static void the_limits_of_every_number_are_valid(void **state)
+{
+    (void)state;
+    /* What stands behind a list is nothing that it could hold. */
+    static const uint8_t ended[SENSORS + 1U] = {0U, 0U, 1U, STATES};
+    static const hg_real ended_A[(STATES * STATES) + STATES] = {R(1), R(0.125), R(0), R(1), R(7), R(7)};
+    static const hg_real ended_steps[STATES + 1U] = {R(128), R(0), R(128)};
+    static const hg_real halves[SENSORS] = {R(0.5), R(0.5), R(0.5)};
+    static const hg_fusion_table no_early[1] = {{.alive = 7U, .level = levels, .relax = relaxes, .early = NULL}};
+    static hg_real many[HG_FUSION_SENSORS_MAX];
+    static const uint8_t zeros[HG_FUSION_SENSORS_MAX] = {0U};
+    for (size_t i = 0U; i < COUNT(many); i++) {
+        many[i] = R(1);
+    }
+    hg_fusion_config c[15];
+    for (size_t i = 0U; i < COUNT(c); i++) {
+        c[i] = usual;
+    }
+    c[0].inputs = 0U;
+    c[0].B = NULL;
+    c[1].select = NULL;
+    c[1].C = rows;
+    c[2].tables = 1U;
+    c[2].table = no_early; /* without delay nobody reads it */
+    c[3].origin = ended_steps;
+    c[3].A = ended_A;
+    c[4].watchdog = 254U;
+    c[5].heartbeat = 9U;
+    c[6].heartbeat = 1U;
+    c[7].select = ended;
+    c[8].range = halves;
+    c[9].states = HG_FUSION_STATES_MAX;
+    c[10].sensors = HG_FUSION_SENSORS_MAX;
+    c[10].R = many;
+    c[10].range = many;
+    c[10].select = zeros;
+    c[11].modulus = 2U;
+    c[12].modulus = 256U;
+    c[13].smoothing = R(1);
+    c[14].loss = R(1);
+    for (size_t i = 0U; i < COUNT(c); i++) {
         assert_true(hg_fusion_valid(&c[i]));
     }
 }
@@ -294,6 +338,26 @@ static void each_trigger_by_its_inequality(void **state)
     }
 }
 
+static void at_its_level_a_trigger_is_silent(void **state)
+{
+    (void)state;
+    static const struct {
+        hg_fusion_trigger trigger;
+        double            y; /* with level 0.25, S = 4 and dice 1 */
+    } cases[] = {{HG_FUSION_OBSERVATION, 0.5}, {HG_FUSION_INNOVATION, 1.0}, {HG_FUSION_STOCHASTIC, 4.0}};
+    for (size_t i = 0U; i < COUNT(cases); i++) {
+        static rig p;
+        hg_fusion_config c = small;
+        c.trigger = cases[i].trigger;
+        begin(&p, &c);
+        open(&p);
+        p.self.slot[0].entry[0].variance = R(4);
+        p.self.slot[0].entry[0].age = 0U;
+        assert_status(HG_E_EMPTY, hg_fusion_due(&p.self, 0U, R(cases[i].y), R(1)));
+        assert_status(HG_OK, hg_fusion_due(&p.self, 0U, R(cases[i].y * 1.0001), R(1)));
+    }
+}
+
 /* Two sensors of one state, level 1: the second is wanted only while the first one's update leaves too much. */
 static void a_schedule_counts_on_the_sensors_before(void **state)
 {
@@ -334,6 +398,14 @@ static void a_schedule_counts_on_the_sensors_before(void **state)
     assert_status(HG_OK, hg_fusion_receive(&p.self, 0U, 3U, 1U, R(0)));
     assert_status(HG_OK, hg_fusion_receive(&p.self, 1U, 3U, 2U, R(0)));
     close(&p);
+    hg_fusion_config two = c;
+    const hg_real at_it[2] = {R(2), R(0.5)};
+    const hg_fusion_table exact[1] = {{.alive = 3U, .level = at_it, .relax = none, .early = none}};
+    static rig q;
+    two.table = exact;
+    begin(&q, &two);
+    open(&q); /* P = 2: not above it */
+    assert_false(entry_of(&q, 0U)->expected);
     p.self.P[0] = R(-0.5); /* as if next to nothing were open */
     open(&p);
     assert_false(entry_of(&p, 0U)->expected);
@@ -411,6 +483,34 @@ static void a_state_that_is_none_begins_again(void **state)
     assert_count(UINT16_MAX, p.self.resets);
 }
 
+static void no_variance_may_be_negative_and_each_may_be_0(void **state)
+{
+    (void)state;
+    static const hg_real unit[STATES * STATES] = {R(1), R(0), R(0), R(1)};
+    static const hg_real nothing[STATES * STATES] = {R(0), R(0), R(0), R(0)};
+    static const hg_real below[2][STATES * STATES] = {{R(-0.25), R(0), R(0), R(1)}, {R(1), R(0), R(0), R(-0.25)}};
+    static const hg_real mute[RATES * SENSORS] = {R(-1), R(-1), R(-1), R(-1), R(-1), R(-1)};
+    static const hg_fusion_table silent[1] = {{.alive = 7U, .level = levels, .relax = mute, .early = mute}};
+    hg_fusion_config c = usual;
+    c.A = unit;
+    c.Q = nothing;
+    c.tables = 1U;
+    c.table = silent;
+    for (size_t i = 0U; i < COUNT(below); i++) {
+        static rig p;
+        c.P0 = below[i];
+        begin(&p, &c);
+        open(&p);
+        assert_status(HG_E_NUMERIC, hg_fusion_close(&p.self));
+    }
+    static rig p;
+    c.P0 = nothing; /* all is known */
+    begin(&p, &c);
+    open(&p);
+    close(&p);
+    assert_count(0U, p.self.resets);
+}
+
 /* ---- frames ---- */
 
 static void open_and_close_take_turns(void **state)
@@ -454,38 +554,43 @@ static void each_frame_has_its_status_and_counter(void **state)
     open(&p);
     assert_status(HG_E_STAMP, hg_fusion_receive(&p.self, 1U, 0U, 0U, R(0)));
     close(&p);
-    p.sensor[1].late = UINT16_MAX;
-    assert_status(HG_E_STAMP, hg_fusion_receive(&p.self, 1U, 0U, 0U, R(0)));
-    assert_count(UINT16_MAX, p.sensor[1].late);
+    p.sensor[1].late = UINT16_MAX - 2U;
+    for (uint16_t more = 0U; more < 3U; more++) {
+        assert_status(HG_E_STAMP, hg_fusion_receive(&p.self, 1U, 0U, 0U, R(0)));
+        assert_count((more == 0U) ? (UINT16_MAX - 1) : UINT16_MAX, p.sensor[1].late);
+    }
 }
 
 static void lost_frames_are_counted_and_make_a_rate(void **state)
 {
     (void)state;
-    static const uint8_t counters[] = {7U, 8U, 11U, 10U}; /* none, none, 2, and 14 lost */
-    static rig p;
-    double loss = 0.25;
-    hg_fusion_config c = usual;
-    c.loss = R(0.25);
-    c.smoothing = R(0.055);
-    begin(&p, &c);
-    const uint8_t gaps[] = {0U, 0U, 2U, 14U};
-    uint16_t lost = 0U;
-    for (size_t i = 0U; i < COUNT(counters); i++) {
-        open(&p);
-        assert_status(HG_OK, hg_fusion_receive(&p.self, 0U, stamp(&p), counters[i], R(0)));
-        close(&p);
-        const double weight = (1.0 / (16.0 + (double)i) > 0.055) ? 1.0 / (16.0 + (double)i) : 0.055;
-        for (uint8_t g = 0U; g < gaps[i]; g++) {
-            loss += weight * (1.0 - loss);
+    static const uint8_t counters[] = {7U, 8U, 11U, 10U}; /* none, none, 2, and all but one of a round lost */
+    for (uint16_t modulus = 15U; modulus <= 16U; modulus++) {
+        static rig p;
+        double loss = 0.25;
+        hg_fusion_config c = usual;
+        c.loss = R(0.25);
+        c.smoothing = R(0.055);
+        c.modulus = modulus;
+        begin(&p, &c);
+        const uint8_t gaps[] = {0U, 0U, 2U, (uint8_t)(modulus - 2U)};
+        uint16_t lost = 0U;
+        for (size_t i = 0U; i < COUNT(counters); i++) {
+            open(&p);
+            assert_status(HG_OK, hg_fusion_receive(&p.self, 0U, stamp(&p), counters[i], R(0)));
+            close(&p);
+            const double weight = (1.0 / (16.0 + (double)i) > 0.055) ? 1.0 / (16.0 + (double)i) : 0.055;
+            for (uint8_t g = 0U; g < gaps[i]; g++) {
+                loss += weight * (1.0 - loss);
+            }
+            loss -= weight * loss;
+            lost = (uint16_t)(lost + gaps[i]);
+            assert_near(loss, p.sensor[0].loss, 1e-6);
+            assert_count(lost, p.sensor[0].lost);
+            assert_count(i + 1U, p.sensor[0].frames);
         }
-        loss -= weight * loss;
-        lost = (uint16_t)(lost + gaps[i]);
-        assert_near(loss, p.sensor[0].loss, 1e-6);
-        assert_count(lost, p.sensor[0].lost);
-        assert_count(i + 1U, p.sensor[0].frames);
+        assert_count(0U, p.sensor[1].frames);
     }
-    assert_count(0U, p.sensor[1].frames);
 }
 
 /* The rate chooses the row: relax 0.25 at 0, 0.75 from 0.125 on, and the last row for all beyond. */
@@ -578,9 +683,10 @@ static void silence_of_a_sensor_that_its_table_leaves_out_says_nothing(void **st
     open(&p);
     p.self.slot[p.self.newest].entry[0].known = HG_FUSION_SILENT;
     p.self.slot[p.self.newest].entry[1].known = HG_FUSION_SILENT;
+    const double s = (double)entry_of(&p, 1U)->variance;
     close(&p);
     assert_real(0.0, p.record[0].spread);
-    assert_true(p.record[1].spread > R(0));
+    assert_near(s * 1.125, p.record[1].spread, 1e-6); /* of its table, without losses */
 }
 
 static void a_sensor_taken_out_is_heard_but_not_fused(void **state)
@@ -591,6 +697,7 @@ static void a_sensor_taken_out_is_heard_but_not_fused(void **state)
     c.watchdog = 254U;
     begin(&p, &c);
     hg_fusion_exclude(&p.self, 0U, true);
+    hg_fusion_exclude(&p.self, 0U, true); /* it is out already */
     for (uint8_t k = 0U; k < 12U; k++) {
         open(&p);
         assert_count(6U, hg_fusion_alive(&p.self));
@@ -684,6 +791,81 @@ static void late_frames_are_filtered_in(void **state)
         for (uint8_t i = 0U; i < SENSORS; i++) {
             assert_count(entry_of(&now, i)->age, entry_of(&later, i)->age);
         }
+    }
+}
+
+/* What silence is worth follows the loss rate: a sample that was filtered by the rate of its time is not filtered again without need. */
+static void only_what_a_late_frame_changes_is_filtered_again(void **state)
+{
+    (void)state;
+    uint32_t seed = seed_of_run(13U);
+    static rig none; /* holds no sample, so that it cannot */
+    static rig open_;
+    static rig shut;
+    hg_fusion_config c = usual;
+    hg_fusion_config bare = usual;
+    c.smoothing = R(0.5);
+    c.heartbeat = 9U;
+    bare.smoothing = c.smoothing;
+    bare.heartbeat = 9U;
+    bare.depth = 0U;
+    begin(&none, &bare);
+    begin(&open_, &c);
+    for (uint32_t k = 0U; k < 200U; k++) {
+        open(&none);
+        open(&open_);
+        for (uint8_t i = 0U; i < SENSORS; i++) {
+            const uint8_t counter = (uint8_t)(draw(&seed) % 16U); /* many are lost, and then none */
+            const hg_real y = R(draw_between(&seed, -64, 64) / 64.0);
+            if (draw_between(&seed, 0, 2) == 0) {
+                assert_status(HG_OK, hg_fusion_receive(&none.self, i, stamp(&none), counter, y));
+                assert_status(HG_OK, hg_fusion_receive(&open_.self, i, stamp(&open_), counter, y));
+            }
+        }
+        close(&none);
+        close(&open_);
+        assert_same(&none, &open_);
+    }
+    begin(&open_, &c);
+    begin(&shut, &c);
+    for (uint32_t k = 0U; k < 200U; k++) {
+        const hg_real y = R(draw_between(&seed, -64, 64) / 64.0);
+        const uint8_t counter = (uint8_t)(draw(&seed) % 16U);
+        const uint8_t before = (uint8_t)((k + 15U) & 15U);
+        const bool late = (k > 0U) && (draw_between(&seed, 0, 2) == 0);
+        if (late) { /* a frame of the sample before, told before or after the next is opened */
+            assert_status(HG_OK, hg_fusion_receive(&shut.self, 1U, before, 0U, y));
+        }
+        open(&open_);
+        open(&shut);
+        if (late) {
+            assert_status(HG_OK, hg_fusion_receive(&open_.self, 1U, before, 0U, y));
+        }
+        if (draw_between(&seed, 0, 2) == 0) {
+            assert_status(HG_OK, hg_fusion_receive(&open_.self, 0U, stamp(&open_), counter, y));
+            assert_status(HG_OK, hg_fusion_receive(&shut.self, 0U, stamp(&shut), counter, y));
+        }
+        close(&open_);
+        close(&shut);
+        assert_same(&open_, &shut);
+    }
+    begin(&open_, &c);
+    begin(&shut, &c);
+    for (uint32_t k = 0U; k < 200U; k++) { /* one frame that is late, and then never again */
+        open(&open_);
+        open(&shut);
+        if ((k == 0U) || (k == 3U)) {
+            rig *const hears = (k == 0U) ? &open_ : &shut;
+            assert_status(HG_OK, hg_fusion_receive(&hears->self, 1U, 0U, 0U, R(0.5)));
+        }
+        if ((k > 3U) && (draw_between(&seed, 0, 2) == 0)) {
+            const uint8_t counter = (uint8_t)(draw(&seed) % 16U);
+            assert_status(HG_OK, hg_fusion_receive(&open_.self, 0U, stamp(&open_), counter, R(0.25)));
+            assert_status(HG_OK, hg_fusion_receive(&shut.self, 0U, stamp(&shut), counter, R(0.25)));
+        }
+        close(&open_);
+        close(&shut);
+        assert_true((k < 3U) || (memcmp(open_.self.P, shut.self.P, STATES * STATES * sizeof(hg_real)) == 0));
     }
 }
 
@@ -807,6 +989,12 @@ static void a_frame_tells_of_the_past(void **state)
     p.sensor[0].loss = q.sensor[0].loss;
     assert_same(&p, &q);
     assert_count(2U, p.sensor[0].frames); /* what was restored came in no frame of its own */
+    /* Said once more, and otherwise: what is known stays what it is. */
+    assert_status(HG_OK, hg_fusion_recall(&p.self, 0U, stamp(&p), 0xFFU, R(-7)));
+    for (uint32_t back = 1U; back <= DEPTH; back++) {
+        assert_int_equal((int)expected[back - 1U], (int)p.slot[(p.self.newest + SLOTS - back) % SLOTS].entry[0].known);
+    }
+    assert_real(2.0, p.slot[(p.self.newest + SLOTS - 2U) % SLOTS].entry[0].y);
     /* Without the value, the last one is known to be lost; a frame of a sample that is not held tells nothing. */
     for (uint32_t k = 0U; k < 2U; k++) {
         open(&p);
@@ -855,6 +1043,30 @@ static void a_frame_tells_of_the_past(void **state)
     }
 }
 
+/* A frame that is itself late tells of what was before it, and of nothing after; other sensors' frames are none of its business. */
+static void a_late_frame_tells_of_the_past_before_it(void **state)
+{
+    (void)state;
+    static rig p;
+    hg_fusion_config c = usual;
+    c.heartbeat = 9U;
+    begin(&p, &c);
+    for (uint32_t k = 0U; k < (2U * SLOTS); k++) {
+        open(&p);
+        assert_status(HG_OK, hg_fusion_receive(&p.self, 1U, stamp(&p), (uint8_t)k, R(0)));
+        if (k < ((2U * SLOTS) - 1U)) {
+            close(&p);
+        }
+    }
+    assert_status(HG_OK, hg_fusion_recall(&p.self, 0U, (uint8_t)(stamp(&p) + 15U), 0x01U, R(2)));
+    const hg_fusion_known expected[SLOTS] = {HG_FUSION_NOTHING, HG_FUSION_NOTHING, HG_FUSION_VALUE, HG_FUSION_SILENT, HG_FUSION_SILENT};
+    for (uint32_t back = 0U; back < SLOTS; back++) {
+        const hg_fusion_slot *slot = &p.slot[(p.self.newest + SLOTS - back) % SLOTS];
+        assert_int_equal((int)expected[back], (int)slot->entry[0].known);
+        assert_int_equal((int)HG_FUSION_VALUE, (int)slot->entry[1].known);
+    }
+}
+
 /* ---- the origin ---- */
 
 #define LAG 3U /* samples that a frame is late */
@@ -883,14 +1095,18 @@ static void the_origin_moves_and_nothing_else_does(void **state)
             at += 10.0;
             open(&still);
             open(&moving);
+            const hg_fusion_slot *settled = &moving.slot[(moving.self.newest + SLOTS - ((k < c.delay) ? k : c.delay)) % SLOTS];
+            assert_true(hg_real_abs(settled->x[0]) < R(16)); /* less than a step is left */
+            assert_memory_equal(moving.slot[moving.self.newest].x, moving.self.x, STATES * sizeof(hg_real));
             const hg_real y[2] = {R(at), R(at - (16.0 * moving.origin[0]))};
             hg_real *old = before[k % LAG];
-            if (k >= LAG) { /* sensor 1 is heard when the origin has moved more than once since */
-                assert_status(HG_OK, hg_fusion_receive(&still.self, 1U, (uint8_t)((k - LAG) & 15U), (uint8_t)((k - LAG) & 15U), old[0]));
-                assert_status(HG_OK, hg_fusion_receive(&moving.self, 1U, (uint8_t)((k - LAG) & 15U), (uint8_t)((k - LAG) & 15U), old[1]));
+            const uint8_t prompt = (uint8_t)(k % 2U); /* of two that see the same one is heard at once, in turn, */
+            if (k >= LAG) { /* and the other one when the origin has moved more than once since */
+                assert_status(HG_OK, hg_fusion_receive(&still.self, prompt, (uint8_t)((k - LAG) & 15U), (uint8_t)((k - LAG) & 15U), old[0]));
+                assert_status(HG_OK, hg_fusion_receive(&moving.self, prompt, (uint8_t)((k - LAG) & 15U), (uint8_t)((k - LAG) & 15U), old[1]));
             }
-            assert_status(HG_OK, hg_fusion_receive(&still.self, 0U, stamp(&still), (uint8_t)(k & 15U), y[0]));
-            assert_status(HG_OK, hg_fusion_receive(&moving.self, 0U, stamp(&moving), (uint8_t)(k & 15U), y[1]));
+            assert_status(HG_OK, hg_fusion_receive(&still.self, prompt, stamp(&still), (uint8_t)(k & 15U), y[0]));
+            assert_status(HG_OK, hg_fusion_receive(&moving.self, prompt, stamp(&moving), (uint8_t)(k & 15U), y[1]));
             close(&still);
             close(&moving);
             old[0] = y[0];
@@ -901,6 +1117,85 @@ static void the_origin_moves_and_nothing_else_does(void **state)
             assert_count(0, moving.origin[1]);
         }
         assert_true((moving.origin[0] > 100) || (run == 3U));
+    }
+}
+
+/* The same plant with its states the other way round: the same numbers in other places. */
+static void any_state_may_have_the_origin(void **state)
+{
+    (void)state;
+    static const hg_real turned_A[STATES * STATES] = {R(1), R(0), R(0.125), R(1)};
+    static const hg_real turned_B[STATES * INPUTS] = {R(1), R(-0.25), R(0), R(0.5)};
+    static const hg_real turned_Q[STATES * STATES] = {R(0.015625), R(0), R(0), R(0)};
+    static const hg_real turned_x0[STATES] = {R(1), R(0)};
+    static const hg_real turned_P0[STATES * STATES] = {R(1), R(0), R(0), R(4)};
+    static const uint8_t turned_places[SENSORS] = {1U, 1U, 0U};
+    static const hg_real steps[STATES] = {R(16), R(0)};
+    static const hg_real turned_steps[STATES] = {R(0), R(16)};
+    static const hg_real wide[SENSORS] = {R(1e6), R(1e6), R(1e6)};
+    static rig p;
+    static rig q;
+    hg_fusion_config c = usual;
+    c.range = wide;
+    c.origin = steps;
+    hg_fusion_config turned = c;
+    turned.A = turned_A;
+    turned.B = turned_B;
+    turned.Q = turned_Q;
+    turned.x0 = turned_x0;
+    turned.P0 = turned_P0;
+    turned.select = turned_places;
+    turned.origin = turned_steps;
+    begin(&p, &c);
+    begin(&q, &turned);
+    for (uint32_t k = 0U; k < 100U; k++) {
+        open(&p);
+        open(&q);
+        assert_count(p.origin[0], q.origin[1]);
+        const double origin = 16.0 * p.origin[0];
+        const uint8_t late = (uint8_t)((k - 2U) & 15U);
+        assert_status(HG_OK, hg_fusion_receive(&p.self, 0U, stamp(&p), (uint8_t)(k & 15U), R((9.0 * k) - origin)));
+        assert_status(HG_OK, hg_fusion_receive(&q.self, 0U, stamp(&q), (uint8_t)(k & 15U), R((9.0 * k) - origin)));
+        if (k >= 2U) { /* of a sample with another origin */
+            const hg_real local = hg_fusion_local(&p.self, 1U, late, R(9.0 * (k - 2.0)));
+            assert_real(local, hg_fusion_local(&q.self, 1U, late, R(9.0 * (k - 2.0))));
+            assert_status(HG_OK, hg_fusion_receive(&p.self, 1U, late, (uint8_t)((k - 2U) & 15U), local));
+            assert_status(HG_OK, hg_fusion_receive(&q.self, 1U, late, (uint8_t)((k - 2U) & 15U), local));
+        }
+        close(&p);
+        close(&q);
+        assert_near(p.self.x[0], q.self.x[1], 1e-4);
+        assert_near(p.self.x[1], q.self.x[0], 1e-4);
+        assert_near((9.0 * k) - origin, p.self.x[0], 8.0);
+    }
+    assert_true(p.origin[0] > 40);
+}
+
+static void an_absolute_value_is_taken_from_the_origin_of_its_sample(void **state)
+{
+    (void)state;
+    static const hg_real both[STATES] = {R(16), R(0)};
+    static const hg_real wide[SENSORS] = {R(1e6), R(1e6), R(1e6)};
+    for (uint32_t run = 0U; run < 2U; run++) {
+        static rig p;
+        hg_fusion_config c = usual;
+        double origin_of[60];
+        c.range = wide;
+        c.origin = (run == 0U) ? both : NULL;
+        begin(&p, &c);
+        for (uint32_t k = 0U; k < COUNT(origin_of); k++) {
+            open(&p);
+            origin_of[k] = 16.0 * p.origin[0];
+            for (uint32_t lag = 0U; lag < 15U; lag++) {
+                const bool held = (lag <= k) && (lag <= DEPTH);
+                const double origin = held ? origin_of[k - lag] : origin_of[k]; /* of what is not held any more the present one */
+                assert_near(1000.0 - origin, hg_fusion_local(&p.self, 0U, (uint8_t)((k - lag) & 15U), R(1000)), 1e-3);
+                assert_near(1000.0, hg_fusion_local(&p.self, 2U, (uint8_t)((k - lag) & 15U), R(1000)), 1e-3); /* sees no state that has an origin */
+            }
+            assert_status(HG_OK, hg_fusion_receive(&p.self, 0U, stamp(&p), (uint8_t)(k & 15U), R((20.0 * k) - origin_of[k])));
+            close(&p);
+        }
+        assert_true((run == 1U) || (p.origin[0] > 60));
     }
 }
 
@@ -950,6 +1245,7 @@ static void a_code_that_wraps_is_unwrapped_by_the_prediction(void **state)
                 assert_real((double)last, y); /* as it was when that sample was open */
             }
             last = hg_fusion_unwrap(&p.self, 0U, stamp(&p), R(code), R(8));
+            assert_real(last, hg_fusion_unwrap(&p.self, 1U, stamp(&p), R(code), R(8))); /* of the same state */
             assert_near(at, (double)last + (16.0 * p.origin[0]), 1e-4);
             assert_status(HG_OK, hg_fusion_receive(&p.self, 0U, stamp(&p), (uint8_t)(k & 15), last));
             close(&p);
@@ -959,18 +1255,41 @@ static void a_code_that_wraps_is_unwrapped_by_the_prediction(void **state)
     }
 }
 
+static void of_all_that_a_code_can_stand_for_it_is_the_nearest(void **state)
+{
+    (void)state;
+    static const double periods[] = {0.5, 1.0, 8.0};
+    static rig p;
+    begin(&p, &usual);
+    open(&p);
+    assert_real(3.0, hg_fusion_unwrap(&p.self, 0U, (uint8_t)(stamp(&p) + 15U), R(3), R(8))); /* the one sample that is held is the present one */
+    const double reference = (double)entry_of(&p, 0U)->reference;
+    for (size_t i = 0U; i < COUNT(periods); i++) {
+        for (int code = -40; code <= 40; code++) {
+            const double y = reference + (0.11 * code);
+            const double found = (double)hg_fusion_unwrap(&p.self, 0U, stamp(&p), R(y), R(periods[i]));
+            const double steps = (found - y) / periods[i];
+            assert_true(fabs(found - reference) <= (0.5 * periods[i]) + 1e-5);
+            assert_near(floor(steps + 0.5), steps, 1e-5);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(start_tells_null),
         cmocka_unit_test(validity_looks_at_every_number_and_table),
+        cmocka_unit_test(the_limits_of_every_number_are_valid),
         cmocka_unit_test(a_value_is_the_kalman_filters_update),
         cmocka_unit_test(silence_narrows_and_pulls_to_the_reference),
         cmocka_unit_test(silence_lies_about_the_reference),
         cmocka_unit_test(each_trigger_by_its_inequality),
+        cmocka_unit_test(at_its_level_a_trigger_is_silent),
         cmocka_unit_test(a_schedule_counts_on_the_sensors_before),
         cmocka_unit_test(hubers_weight_bounds_the_pull_of_a_value),
         cmocka_unit_test(a_state_that_is_none_begins_again),
+        cmocka_unit_test(no_variance_may_be_negative_and_each_may_be_0),
         cmocka_unit_test(open_and_close_take_turns),
         cmocka_unit_test(each_frame_has_its_status_and_counter),
         cmocka_unit_test(lost_frames_are_counted_and_make_a_rate),
@@ -980,12 +1299,17 @@ int main(void)
         cmocka_unit_test(silence_of_a_sensor_that_its_table_leaves_out_says_nothing),
         cmocka_unit_test(a_sensor_taken_out_is_heard_but_not_fused),
         cmocka_unit_test(late_frames_are_filtered_in),
+        cmocka_unit_test(only_what_a_late_frame_changes_is_filtered_again),
         cmocka_unit_test(nodes_that_hear_at_different_times_agree),
         cmocka_unit_test(silence_means_less_until_its_time_is_up),
         cmocka_unit_test(a_frame_tells_of_the_past),
+        cmocka_unit_test(a_late_frame_tells_of_the_past_before_it),
         cmocka_unit_test(the_origin_moves_and_nothing_else_does),
+        cmocka_unit_test(any_state_may_have_the_origin),
+        cmocka_unit_test(an_absolute_value_is_taken_from_the_origin_of_its_sample),
         cmocka_unit_test(the_origin_takes_no_more_than_32767_steps_at_once),
         cmocka_unit_test(a_code_that_wraps_is_unwrapped_by_the_prediction),
+        cmocka_unit_test(of_all_that_a_code_can_stand_for_it_is_the_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

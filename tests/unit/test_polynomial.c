@@ -1,205 +1,9 @@
 /** @file
- *  polynomial.h: the filter by hand where it has one state, its limits, silence, and what it answers when numbers fail. The tables are made here by counting,
- *  apart from the host's. Nonlinear plants with skewed noise are held against an independent reference by the host's tests. */
+ *  polynomial.h: the filter by hand where it has one state, its limits, silence, and what it answers when numbers fail. Tables come from polynomial_rig.h, apart
+ *  from the host's; plants of several states are in test_polynomial_plants.c. */
 #include "support.h"
 
-#include "hullguard/polynomial.h"
-
-#define VARIABLES_MAX 8U
-#define RING_MAX 200U
-#define REALS_MAX 20000U
-
-typedef struct {
-    uint8_t exponent[VARIABLES_MAX];
-} monomial;
-
-typedef struct { /* a configuration and what it points to */
-    hg_polynomial_config config;
-    monomial state[RING_MAX], output[RING_MAX], noise_of[RING_MAX], ring[RING_MAX];
-    uint16_t start[RING_MAX + 1U], product[8000], f_end[4], h_end[4];
-    uint8_t parent[RING_MAX], factor[RING_MAX], noise[RING_MAX], moment[RING_MAX], cut_moment[RING_MAX], cut_state[RING_MAX];
-    hg_real mean[RING_MAX], covariance[RING_MAX * RING_MAX], cut_scale[RING_MAX], M0[RING_MAX], f[16], h[16];
-    uint8_t f_factor[48], h_factor[48];
-    hg_real x0[4], P0[16], Q[4], box[4], r[4], range[4], fresh[4];
-    hg_real memory[REALS_MAX];
-    hg_polynomial self;
-    bool normal; /* noise without third moments */
-} rig;
-
-/* A test has no more than these; all of them together would not fit a small board. */
-static rig rigs[4];
-
-static rig *fresh(size_t which)
-{
-    memset(&rigs[which], 0, sizeof rigs[which]);
-    return &rigs[which];
-}
-
-static uint8_t degree_of(const monomial *m, uint8_t from, uint8_t to)
-{
-    uint8_t sum = 0U;
-    for (uint8_t i = from; i < to; i++) {
-        sum = (uint8_t)(sum + m->exponent[i]);
-    }
-    return sum;
-}
-
-/* All monomials in graded order, by counting through all exponents in the order in which the first variable's is largest first. */
-static uint16_t list(monomial *out, uint8_t variables, uint8_t degree)
-{
-    uint16_t count = 0U;
-    for (uint8_t total = 0U; total <= degree; total++) {
-        monomial m = {{0U}};
-        uint32_t codes = 1U;
-        for (uint8_t i = 0U; i < variables; i++) {
-            codes *= (uint32_t)degree + 1U;
-        }
-        for (uint32_t code = codes; code-- > 0U;) {
-            uint32_t left = code;
-            for (uint8_t i = variables; i-- > 0U;) {
-                m.exponent[i] = (uint8_t)(left % (degree + 1U));
-                left /= degree + 1U;
-            }
-            if (degree_of(&m, 0U, variables) == total) {
-                out[count] = m;
-                count++;
-            }
-        }
-    }
-    return count;
-}
-
-static uint16_t find(const monomial *among, uint16_t count, const monomial *wanted)
-{
-    for (uint16_t i = 0U; i < count; i++) {
-        if (memcmp(&among[i], wanted, sizeof *wanted) == 0) {
-            return i;
-        }
-    }
-    assert_true(false); /* no such monomial */
-    return 0U;
-}
-
-static monomial part(const monomial *m, uint8_t from, uint8_t to)
-{
-    monomial found = {{0U}};
-    for (uint8_t i = from; i < to; i++) {
-        found.exponent[i - from] = m->exponent[i];
-    }
-    return found;
-}
-
-static monomial times(const monomial *a, const monomial *b)
-{
-    monomial found;
-    for (uint8_t i = 0U; i < VARIABLES_MAX; i++) {
-        found.exponent[i] = (uint8_t)(a->exponent[i] + b->exponent[i]);
-    }
-    return found;
-}
-
-/* Moments of a normal number of this variance with a third moment beside, exact to degree 4; degree 6 only where it is normal. */
-static double moment_of(double variance, double third, uint8_t order)
-{
-    const double of[] = {1.0, 0.0, variance, third, 3.0 * variance * variance, 0.0, 15.0 * variance * variance * variance};
-    return of[order];
-}
-
-static double expected(const rig *p, const monomial *b)
-{
-    double product = 1.0;
-    const uint8_t n = p->config.states;
-    for (uint8_t i = 0U; i < n + p->config.outputs; i++) {
-        const double variance = (double)((i < n) ? p->Q[i] : p->r[i - n]);
-        product *= moment_of(variance, ((i < n) || p->normal) ? 0.0 : 0.5 * variance * sqrt(variance), b->exponent[i]);
-    }
-    return product;
-}
-
-static void make_powers(rig *p, const monomial *order, uint16_t count, uint8_t variables, uint16_t at)
-{
-    for (uint16_t a = 1U; a < count; a++) {
-        uint8_t v = 0U;
-        while (order[a].exponent[v] == 0U) {
-            v++;
-        }
-        monomial less = order[a];
-        less.exponent[v]--;
-        const uint16_t parent = find(order, count, &less);
-        p->parent[at + a - 1U] = (uint8_t)((a > variables) ? (parent - 1U) : 0U);
-        p->factor[at + a - 1U] = v;
-    }
-}
-
-static void make_cuts(rig *p)
-{
-    const hg_polynomial_config *c = &p->config;
-    for (uint16_t i = c->lower; i < c->ring; i++) {
-        const uint16_t at = (uint16_t)(i - c->lower);
-        monomial x = part(&p->ring[i], 0U, c->states);
-        monomial b = part(&p->ring[i], c->states, (uint8_t)(2U * c->states + c->outputs));
-        p->cut_state[at] = HG_POLYNOMIAL_NONE;
-        if (degree_of(&x, 0U, c->states) > c->degree) {
-            uint8_t l = (uint8_t)(c->states - 1U);
-            while (x.exponent[l] == 0U) {
-                l--;
-            }
-            x.exponent[l]--;
-            p->cut_state[at] = l;
-        }
-        p->cut_moment[at] = (uint8_t)find(p->state, (uint16_t)(c->lifted + 1U), &x);
-        p->cut_scale[at] = R(1.0 + degree_of(&b, 0U, VARIABLES_MAX)); /* any number above 0 */
-    }
-}
-
-/* All tables of n, p, mu; variances, maps and levels are there. */
-static void make_tables(rig *p)
-{
-    hg_polynomial_config *c = &p->config;
-    const uint8_t n = c->states, variables = (uint8_t)(2U * n + c->outputs), highest = (uint8_t)(c->degree + (c->bounded ? 1U : 0U));
-    const uint16_t states = list(p->state, n, c->degree), outputs = list(p->output, c->outputs, c->degree);
-    c->lifted = (uint8_t)(states - 1U);
-    c->measured = (uint8_t)(outputs - 1U);
-    c->judged = (uint8_t)(hg_polynomial_count(c->outputs, (c->degree > 2U) ? 2U : c->degree) - 1U);
-    c->noises = (uint8_t)list(p->noise_of, (uint8_t)(n + c->outputs), c->degree);
-    c->ring = list(p->ring, variables, highest);
-    c->lower = (uint16_t)hg_polynomial_count(variables, c->degree);
-    for (uint16_t i = 0U; i < c->ring; i++) {
-        p->start[i + 1U] = p->start[i];
-        for (uint16_t j = 0U; j < c->ring; j++) {
-            if ((degree_of(&p->ring[i], 0U, variables) + degree_of(&p->ring[j], 0U, variables)) <= highest) {
-                const monomial m = times(&p->ring[i], &p->ring[j]);
-                p->product[p->start[i + 1U]] = find(p->ring, c->ring, &m);
-                p->start[i + 1U]++;
-            }
-        }
-    }
-    for (uint16_t i = 0U; i < c->lower; i++) {
-        const monomial x = part(&p->ring[i], 0U, n), b = part(&p->ring[i], n, variables);
-        p->moment[i] = (uint8_t)find(p->state, states, &x);
-        p->noise[i] = (uint8_t)find(p->noise_of, c->noises, &b);
-    }
-    for (uint16_t a = 0U; a < c->noises; a++) {
-        p->mean[a] = R(expected(p, &p->noise_of[a]));
-        for (uint16_t b = 0U; b < c->noises; b++) {
-            const monomial both = times(&p->noise_of[a], &p->noise_of[b]);
-            p->covariance[a * c->noises + b] = R(expected(p, &both) - expected(p, &p->noise_of[a]) * expected(p, &p->noise_of[b]));
-        }
-    }
-    for (uint16_t a = 0U; a < states; a++) {
-        for (uint16_t b = 0U; b < states; b++) {
-            const monomial both = times(&p->state[a], &p->state[b]);
-            double value = 1.0;
-            for (uint8_t l = 0U; l < n; l++) {
-                value *= moment_of((double)p->P0[l * n + l], 0.0, both.exponent[l]);
-            }
-            p->M0[a * states + b] = R(value);
-        }
-    }
-    make_powers(p, p->state, states, n, 0U);
-    make_powers(p, p->output, outputs, c->outputs, c->lifted);
-    make_cuts(p);
-}
+#include "polynomial_rig.h"
 
 /* n states x+ = 0.5 x (the first; cubic x^3 / 8 off with `cubic`), p outputs that all see the first. */
 static void set_up(rig *p, uint8_t n, uint8_t outputs, uint8_t mu, bool bounded, bool cubic)
@@ -261,6 +65,14 @@ static void sizes_are_binomials(void **state)
     for (size_t i = 0U; i < COUNT(refused); i++) {
         assert_count(UINT32_MAX, hg_polynomial_reals(refused[i][0], refused[i][1], refused[i][2], refused[i][3] != 0U));
     }
+    /* On both sides of what indices of 8 bits, and lists of products with those of 16, can hold. */
+    assert_true(hg_polynomial_reals(253U, 1U, 1U, false) != UINT32_MAX); /* 254 rows, 255 noises */
+    assert_count(UINT32_MAX, hg_polynomial_reals(253U, 2U, 1U, false));
+    assert_true(hg_polynomial_reals(16U, 16U, 1U, false) != UINT32_MAX);
+    assert_true(hg_polynomial_reals(20U, 1U, 2U, false) != UINT32_MAX);
+    assert_count(UINT32_MAX, hg_polynomial_reals(21U, 1U, 2U, false)); /* 276 noises */
+    assert_true(hg_polynomial_reals(7U, 2U, 3U, true) != UINT32_MAX);  /* 58 905 products */
+    assert_count(UINT32_MAX, hg_polynomial_reals(8U, 1U, 3U, true));   /* 73 815 */
 }
 
 static void validity_looks_at_every_number_and_table(void **state)
@@ -281,9 +93,16 @@ static void validity_looks_at_every_number_and_table(void **state)
     REFUSED(c.lifted++);
     REFUSED(c.lower--);
     REFUSED(c.judged--);
-    REFUSED(c.f.end = NULL);
-    REFUSED(c.fresh = NULL);
-    REFUSED(c.box = NULL);
+    const void **const table[] = {(const void **)&c.f.end,   (const void **)&c.f.coefficient, (const void **)&c.f.factor,   (const void **)&c.h.end,
+                                  (const void **)&c.h.coefficient, (const void **)&c.h.factor,  (const void **)&c.start,      (const void **)&c.product,
+                                  (const void **)&c.parent,  (const void **)&c.factor,        (const void **)&c.noise,      (const void **)&c.moment,
+                                  (const void **)&c.mean,    (const void **)&c.covariance,    (const void **)&c.x0,         (const void **)&c.P0,
+                                  (const void **)&c.M0,      (const void **)&c.Q,             (const void **)&c.R,          (const void **)&c.range,
+                                  (const void **)&c.fresh,   (const void **)&c.cut_moment,    (const void **)&c.cut_state,  (const void **)&c.cut_scale,
+                                  (const void **)&c.box};
+    for (size_t i = 0U; i < COUNT(table); i++) {
+        REFUSED(*table[i] = NULL);
+    }
     REFUSED(c.f.width = 0U);
     REFUSED(c.h.width = 0U);
     REFUSED(c.weight = R(1.5));
@@ -298,11 +117,43 @@ static void validity_looks_at_every_number_and_table(void **state)
     p->fresh[0] = R(0);
     REFUSED(p->start[1] = 0U; p->start[0] = 1U);
     p->start[0] = 0U;
+    p->start[1] = 1U;
+    const uint16_t kept = p->start[6];
+    REFUSED(p->start[6] = (uint16_t)(p->start[7] + 1U));
+    p->start[6] = kept;
+    REFUSED((c = (hg_polynomial_config){.states = 1U, .outputs = 1U, .degree = 0U, .noises = 1U, .ring = 1U, .lower = 1U, .f = good.f, .h = good.h, .start = p->start,
+                .product = p->product, .parent = p->parent, .factor = p->factor, .noise = p->noise, .moment = p->moment, .mean = p->mean, .covariance = p->covariance,
+                .x0 = p->x0, .P0 = p->P0, .M0 = p->M0, .Q = p->Q, .R = p->r, .range = p->range, .fresh = p->fresh, .kappa = R(1), .joint = R(1), .weight = R(1),
+                .drift = R(1)})); /* the tables of degree 0 */
     c.degree = 4U;
     assert_status(HG_E_ARGUMENT, hg_polynomial_start(NULL, &good, p->memory, REALS_MAX));
     assert_status(HG_E_ARGUMENT, hg_polynomial_start(&p->self, NULL, p->memory, REALS_MAX));
     assert_status(HG_E_ARGUMENT, hg_polynomial_start(&p->self, &good, NULL, REALS_MAX));
     assert_status(HG_E_CONFIG, hg_polynomial_start(&p->self, &c, p->memory, REALS_MAX));
+}
+
+static void the_limits_of_every_number_are_valid(void **state)
+{
+    (void)state;
+    rig *p = fresh(0U);
+    set_up(p, 1U, 2U, 1U, false, false);
+    begin(p);
+    hg_polynomial_config c = p->config;
+    assert_true(hg_polynomial_valid(&c));
+    c.weight = R(1);
+    c.f.width = 1U;
+    c.reach = R(0); /* nobody asks without a bound */
+    c.box = NULL;
+    c.cut_moment = NULL;
+    c.cut_state = NULL;
+    c.cut_scale = NULL;
+    p->range[0] = R(0.5);
+    for (uint16_t i = 1U; i <= c.ring; i++) {
+        p->start[i] = p->start[0]; /* no products at all */
+    }
+    assert_true(hg_polynomial_valid(&c));
+    p->r[1] = R(0);
+    assert_false(hg_polynomial_valid(&c));
 }
 
 static void memory_is_as_long_as_said(void **state)
@@ -318,6 +169,8 @@ static void memory_is_as_long_as_said(void **state)
     assert_status(HG_OK, step(p, 1.0));
     assert_untouched(&p->memory[length], REALS_MAX - length);
     assert_true(&p->self.term[p->config.ring] == &p->memory[length]);
+    assert_true(p->self.gain == &p->self.AP[10U * 5U]);
+    assert_true(p->self.filtered == &p->self.gain[5U * 5U]);
     set_up(p, 2U, 1U, 2U, false, true);
     begin(p);
     const uint32_t plain = hg_polynomial_reals(2U, 1U, 2U, false);
@@ -429,6 +282,68 @@ static void each_statistic_has_its_level(void **state)
     assert_count(HG_POLYNOMIAL_DRIFT, p->self.judgement.above);
 }
 
+static void at_its_level_no_statistic_is_above_it(void **state)
+{
+    (void)state;
+    rig *p = fresh(0U);
+    set_up(p, 1U, 1U, 1U, false, false);
+    p->r[0] = R(1.25); /* S = 2.25 */
+    p->config.kappa = R(4);
+    begin(p);
+    assert_status(HG_OK, step(p, 6.0));
+    assert_real(6.0, p->self.judgement.plain);
+    assert_real(6.0, p->self.judgement.threshold);
+    assert_count(0U, p->self.judgement.above & HG_POLYNOMIAL_PLAIN);
+    const hg_polynomial_judgement found = p->self.judgement;
+    p->config.joint = found.joint;
+    p->config.drift = found.drift;
+    hg_polynomial_reset(&p->self);
+    assert_status(HG_OK, step(p, 6.0));
+    assert_real(found.joint, p->self.judgement.joint);
+    assert_real(found.drift, p->self.judgement.drift);
+    assert_count(0U, p->self.judgement.above);
+}
+
+/* As before the first sample: also what nobody has computed yet. */
+static void a_reset_is_a_beginning(void **state)
+{
+    (void)state;
+    rig *p = fresh(0U);
+    set_up(p, 3U, 2U, 1U, false, false);
+    for (uint8_t i = 0U; i < 3U; i++) {
+        p->x0[i] = R(0.25 * (1.0 + i));
+        p->P0[4U * i] = R(1.0 + i);
+    }
+    make_tables(p);
+    for (size_t round = 0U; round < 2U; round++) {
+        if (round == 0U) {
+            p->self.dropped = 7U;
+            p->self.held = 8U;
+            p->self.restarts = 9U;
+            arm(p->memory, REALS_MAX);
+            assert_status(HG_OK, hg_polynomial_start(&p->self, &p->config, p->memory, REALS_MAX));
+            assert_count(0U, p->self.dropped);
+            assert_count(0U, p->self.held);
+            assert_count(0U, p->self.restarts);
+        } else {
+            hg_polynomial_reset(&p->self);
+        }
+        for (size_t i = 0U; i < 9U; i++) {
+            assert_real(p->P0[i], p->self.Px[i]);
+            assert_real(p->P0[i], p->self.Pe[i]);
+        }
+        assert_memory_equal(p->x0, p->self.x, 3U * sizeof(hg_real));
+        assert_memory_equal(p->x0, p->self.ekf, 3U * sizeof(hg_real));
+        assert_memory_equal(p->x0, p->self.c, 3U * sizeof(hg_real));
+        assert_real(0.0, p->self.mean[0]);
+        assert_real(0.0, p->self.mean[1]);
+        assert_count(0U, p->self.judgement.above);
+        assert_real(0.0, p->self.judgement.plain);
+        assert_status(HG_OK, step(p, 50.0));
+        assert_true(p->self.judgement.above != 0U);
+    }
+}
+
 static void wrong_input_changes_nothing(void **state)
 {
     (void)state;
@@ -447,6 +362,14 @@ static void wrong_input_changes_nothing(void **state)
     begin(p);
     static const hg_real first[2] = {REAL_NAN, R(1)};
     assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, first, exact));
+    static const hg_real second[2] = {R(1), REAL_NAN}, at_range[2] = {R(1000), R(-1000)}, last[2] = {R(0), HG_REAL_MAX}, beyond[2] = {R(0), R(1001)};
+    assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, second, exact));
+    assert_status(HG_OK, hg_polynomial_step(&p->self, at_range, exact));
+    assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, beyond, last)); /* the largest radius is one: its value is looked at, */
+    static const hg_real none[2] = {REAL_INF, HG_REAL_MAX}, far[2] = {REAL_NAN, R(900)};
+    hg_polynomial_reset(&p->self);
+    assert_status(HG_OK, hg_polynomial_step(&p->self, far, none)); /* and stands in the residual, if in no threshold */
+    assert_near(900.0, p->self.judgement.plain, 1e-3);
     assert_count(0, p->self.restarts);
 }
 
@@ -541,6 +464,11 @@ static void a_component_that_says_nothing_new_is_dropped(void **state)
         assert_true(p->self.Px[0] >= R(0));
     }
     assert_count(10, p->self.dropped); /* of the auxiliary filter and of this, each sample */
+    hg_polynomial_reset(&p->self);
+    const hg_real apart[2] = {R(0.5), R(0.75)};
+    assert_status(HG_OK, hg_polynomial_step(&p->self, apart, exact));
+    assert_near(0.25, p->self.judgement.joint, 1e-4); /* of the first alone */
+    assert_near(0.5, p->self.x[0], 1e-5);
     p->self.dropped = UINT16_MAX;
     assert_status(HG_OK, step(p, 0.5));
     assert_count(UINT16_MAX, p->self.dropped);
@@ -561,6 +489,71 @@ static void an_update_to_no_covariance_is_not_made(void **state)
     assert_real(0.0, p->self.x[0]);
     assert_real(1.0, p->self.Px[0]);
     assert_near(11.0 / 3.0, p->self.P[0], 1e-5); /* Jxx: (1/6)^2 P + (1/3)^2 R + Q + 2 (1/3) 5 */
+}
+
+/* w and v as correlated as c says, which their variances need not allow: J - g g' is about `left`. */
+static void with_correlation(rig *p, double c, double left)
+{
+    set_up(p, 2U, 1U, 1U, false, false);
+    make_tables(p);
+    p->covariance[1 * 4 + 3] = R(c);
+    p->covariance[3 * 4 + 1] = R(c);
+    const double without = 1.0 / 36.0 + 0.5 / 9.0 - 2.0 / 3.0 * c; /* Jxx but for Q */
+    p->covariance[1 * 4 + 1] = R(left + c * c / 1.5 - without);
+    assert_status(HG_OK, hg_polynomial_start(&p->self, &p->config, p->memory, REALS_MAX));
+    assert_status(HG_OK, step(p, 0.5));
+}
+
+static void a_variance_may_miss_0_by_rounding_and_no_more(void **state)
+{
+    (void)state;
+    rig *p = fresh(0U);
+    with_correlation(p, -1.7, -0.46); /* as clearly as may be, and by less than Jxx */
+    assert_count(1, p->self.held);
+    p->self.held = UINT16_MAX;
+    hg_polynomial_reset(&p->self);
+    assert_status(HG_OK, step(p, 0.5));
+    assert_count(UINT16_MAX, p->self.held);
+    if (sizeof(hg_real) == 4U) { /* 5e-6 of 10 000: half of what rounding may leave */
+        with_correlation(p, -122.5, -0.05);
+        assert_count(0, p->self.held);
+        assert_real(0.0, p->self.P[0]);
+    }
+}
+
+/* What silence is worth is weighed exactly: with J = 4, P = 1 a radius of 1/2 leaves the state as uncertain as it was, and one of sqrt(J) is worth nothing. */
+static void silence_that_makes_nothing_smaller_is_not_used(void **state)
+{
+    (void)state;
+    static const struct {
+        double   radius;
+        uint16_t held;
+    } cases[] = {{0.49, 0U}, {0.5, 1U}, {0.51, 1U}, {2.0, 0U}};
+    for (size_t i = 0U; i < COUNT(cases); i++) {
+        rig *p = fresh(0U);
+        set_up(p, 1U, 1U, 1U, false, false);
+        p->r[0] = R(3);
+        begin(p);
+        const hg_real y = R(0), wide = R(cases[i].radius);
+        assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &wide));
+        assert_count(cases[i].held, p->self.held);
+    }
+}
+
+/* P that is none, beside one of its numbers that could be one: seen by what the estimate would be, though the prediction has noise enough. */
+static void an_estimate_of_less_than_nothing_is_not_made(void **state)
+{
+    (void)state;
+    rig *p = fresh(0U);
+    set_up(p, 2U, 1U, 1U, false, false);
+    p->Q[0] = R(25);
+    p->Q[1] = R(25);
+    begin(p);
+    p->self.P[0] = R(0.1);    /* the output sees this, */
+    p->self.P[1] = R(0.034);  /* their covariance, */
+    p->self.P[2] = R(0.001);  /* and of this it would take 0.0019 */
+    assert_status(HG_OK, step(p, 0.5));
+    assert_count(1, p->self.held);
 }
 
 /* Nor one for the estimate: P itself is none. */
@@ -596,25 +589,88 @@ static void a_state_that_is_none_begins_again(void **state)
     assert_count(0, p->self.judgement.above);
 }
 
+/* Three states that grow, each for itself, and one output: whatever number is not finite any more, the filter begins again. */
+static void any_number_that_is_none_begins_again(void **state)
+{
+    (void)state;
+    static const hg_real none = REAL_INF, nothing = REAL_NAN;
+    for (size_t i = 0U; i < 11U; i++) {
+        rig *p = fresh(0U);
+        set_up(p, 3U, 1U, 1U, i == 3U, false);
+        p->normal = true;
+        for (size_t l = 0U; l < 3U; l++) {
+            p->f[l] = (i == 3U) ? R(0.25) : R(2);
+        }
+        p->range[0] = HG_REAL_MAX;
+        begin(p);
+        const hg_real large = R(0.9) * HG_REAL_MAX;
+        hg_real y = nothing, radius = none;
+        if (i == 0U) { /* the estimate alone: c + z */
+            p->f[0] = R(0.25);
+            p->self.c[0] = large;
+            p->self.z[1] = large;
+        } else if (i == 1U) {
+            p->f[2] = R(0.25);
+            p->self.c[2] = large;
+            p->self.z[3] = large;
+        } else if (i == 2U) { /* c */
+            p->self.c[2] = large;
+        } else if (i == 3U) { /* the covariance of the estimate, by the bound alone */
+            p->self.P[5] = HG_REAL_MAX;
+        } else if (i == 4U) {
+            p->self.Pe[8] = R(0.4) * HG_REAL_MAX;
+        } else if (i == 5U) {
+            p->self.z[3] = large;
+        } else if (i == 6U) {
+            p->self.P[5] = large;
+        } else if (i == 7U) {
+            p->self.M[9] = large;
+        } else if (i == 8U) {
+            p->self.mean[0] = nothing;
+        } else if (i == 9U) { /* a residual whose square is none, of an output that is there and worth nothing */
+            y = R(0.25) * HG_REAL_MAX;
+            radius = R(1e10);
+        } else {
+            assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &radius)); /* and nothing else */
+            continue;
+        }
+        assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, &y, &radius));
+        assert_count(1, p->self.restarts);
+    }
+    rig *p = fresh(0U);
+    set_up(p, 1U, 2U, 1U, false, false);
+    begin(p);
+    p->self.mean[1] = nothing; /* the last of several */
+    const hg_real both[2] = {none, none};
+    assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, both, both));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sizes_are_binomials),
         cmocka_unit_test(validity_looks_at_every_number_and_table),
+        cmocka_unit_test(the_limits_of_every_number_are_valid),
         cmocka_unit_test(memory_is_as_long_as_said),
         cmocka_unit_test(the_powers_have_room_for_what_follows),
         cmocka_unit_test(the_third_moment_is_used),
         cmocka_unit_test(linear_and_normal_is_the_kalman_filter),
         cmocka_unit_test(the_bound_is_wider),
         cmocka_unit_test(each_statistic_has_its_level),
+        cmocka_unit_test(at_its_level_no_statistic_is_above_it),
+        cmocka_unit_test(a_reset_is_a_beginning),
         cmocka_unit_test(wrong_input_changes_nothing),
         cmocka_unit_test(an_absent_output_is_left_out),
         cmocka_unit_test(silence_is_worth_its_radius),
         cmocka_unit_test(outputs_are_left_out_one_by_one),
         cmocka_unit_test(a_component_that_says_nothing_new_is_dropped),
         cmocka_unit_test(an_update_to_no_covariance_is_not_made),
+        cmocka_unit_test(a_variance_may_miss_0_by_rounding_and_no_more),
+        cmocka_unit_test(silence_that_makes_nothing_smaller_is_not_used),
+        cmocka_unit_test(an_estimate_of_less_than_nothing_is_not_made),
         cmocka_unit_test(an_estimate_with_no_covariance_is_not_made),
         cmocka_unit_test(a_state_that_is_none_begins_again),
+        cmocka_unit_test(any_number_that_is_none_begins_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,6 +84,113 @@ static void tables_that_name_nothing_are_not_valid(void **state)
     assert_true(hg_statistic_valid(&c[11], SIGNALS));
 }
 
+/* ---- two plants side by side: x_a+ = decay_a x_a + B_a (u - zero) + w_a, gain_a signal_a = x_a + D_a (u - zero) + v_a ---- */
+
+#define PAIR 2U
+#define PAIR_REALS (HG_POLYNOMIAL_REALS(PAIR, PAIR, PAIR, PAIR, 7U) + (2U * PAIR))
+#define PAIR_SIGNALS 5U
+
+static const uint16_t pair_end[] = {1U, 2U};
+static const uint8_t pair_factor[] = {0U, 1U, 0U, 1U};
+static const hg_real pair_decay[] = {R(0.5), R(-0.25)};
+static const hg_real pair_one[] = {R(1), R(1)};
+static const uint16_t pair_start[] = {0U, 7U, 8U, 9U, 10U, 11U, 12U, 13U};
+static const uint16_t pair_product[] = {0U, 1U, 2U, 3U, 4U, 5U, 6U, 1U, 2U, 3U, 4U, 5U, 6U};
+static const uint8_t pair_noise[] = {0U, 0U, 0U, 1U, 2U, 3U, 4U};
+static const uint8_t pair_moment[] = {0U, 1U, 2U, 0U, 0U, 0U, 0U};
+static const hg_real pair_mean[] = {R(1), R(0), R(0), R(0), R(0)};
+static const hg_real pair_covariance[25] = {[6] = R(0.25), [12] = R(0.5), [18] = R(0.125), [24] = R(0.75)};
+static const hg_real pair_P0[] = {R(1), R(0), R(0), R(2)};
+static const hg_real pair_M0[] = {R(1), R(0), R(0), R(0), R(1), R(0), R(0), R(0), R(2)};
+static const hg_real pair_Q[] = {R(0.25), R(0.5)};
+static const hg_real pair_R[] = {R(0.125), R(0.75)};
+static const hg_real pair_zero[] = {R(0), R(0)};
+static const hg_real pair_range[] = {R(1000), R(1000)};
+/* What stands behind a list is nothing that it could hold. */
+static const uint8_t pair_signal[] = {3U, 1U, 99U};
+static const hg_real pair_gain[] = {R(4), R(2), R(-1)};
+static const uint8_t pair_input[] = {0U, 4U, 99U};
+static const hg_real pair_rest[] = {R(1), R(-2), R(99)};
+static const hg_real pair_known[] = {R(0), R(0.5), R(-1)};
+static const hg_real pair_drive[] = {R(2), R(0.5), R(-1), R(0.25)};
+static const hg_real pair_direct[] = {R(1), R(-0.5), R(0.75), R(3)};
+static const hg_statistic_config pair_config = {
+    .filter = {.states = PAIR, .outputs = PAIR, .degree = 1U, .bounded = false, .lifted = PAIR, .measured = PAIR, .judged = PAIR, .noises = 5U, .ring = 7U, .lower = 7U,
+               .f = {.width = 1U, .end = pair_end, .coefficient = pair_decay, .factor = pair_factor},
+               .h = {.width = 1U, .end = pair_end, .coefficient = pair_one, .factor = pair_factor},
+               .start = pair_start, .product = pair_product, .parent = pair_factor, .factor = pair_factor, .noise = pair_noise, .moment = pair_moment,
+               .mean = pair_mean, .covariance = pair_covariance, .x0 = pair_zero, .P0 = pair_P0, .M0 = pair_M0, .Q = pair_Q, .R = pair_R,
+               .range = pair_range, .fresh = pair_zero, .kappa = R(4), .joint = R(16), .weight = R(0.25), .drift = R(9)},
+    .signal = pair_signal, .gain = pair_gain, .inputs = 2U, .input = pair_input, .zero = pair_rest, .drive = pair_drive, .direct = pair_direct, .known = pair_known,
+    .settle = SF_SETTLE};
+
+static void every_entry_of_a_list_is_looked_at(void **state)
+{
+    (void)state;
+    static const uint8_t far[] = {3U, PAIR_SIGNALS};
+    static const hg_real below[] = {R(0.5), R(-1)};
+    static const hg_real none[] = {R(4), R(0)};
+    assert_true(hg_statistic_valid(&pair_config, PAIR_SIGNALS));
+    hg_statistic_config c[4] = {pair_config, pair_config, pair_config, pair_config};
+    c[0].signal = far;
+    c[1].gain = none;
+    c[2].input = far;
+    c[3].known = below;
+    for (size_t i = 0U; i < COUNT(c); i++) {
+        assert_false(hg_statistic_valid(&c[i], PAIR_SIGNALS));
+    }
+}
+
+/* Plants that know nothing of each other: what each filter alone would say, and norms over both. */
+static void two_plants_are_filtered_like_each_alone(void **state)
+{
+    (void)state;
+    static hg_statistic self;
+    static hg_real memory[PAIR_REALS + 1U];
+    uint32_t random = seed_of_run(8U);
+    double x[PAIR] = {0.0, 0.0}, estimate[PAIR] = {0.0, 0.0}, variance[PAIR] = {1.0, 2.0};
+    assert_count(PAIR_REALS, hg_statistic_reals(&pair_config));
+    arm(memory, COUNT(memory));
+    assert_status(HG_OK, hg_statistic_start(&self, &pair_config, memory));
+    assert_true(self.y == memory);
+    assert_true(self.radius == &memory[PAIR]);
+    assert_true(self.filter.x == &memory[2U * PAIR]); /* the filter's first */
+    for (int k = 0; k < 100; k++) {
+        hg_real value[PAIR_SIGNALS] = {R(0)}, r[HG_STATISTICS], J[HG_STATISTICS];
+        const hg_real radius[PAIR_SIGNALS] = {R(0)};
+        double square = 0.0, joint = 0.0, trace = 0.0, innovation[PAIR];
+        double u[2];
+        for (size_t i = 0U; i < 2U; i++) {
+            u[i] = draw_between(&random, -64, 64) / 16.0;
+            value[pair_input[i]] = R(u[i] + (double)pair_rest[i]);
+        }
+        for (size_t a = 0U; a < PAIR; a++) {
+            const double y = x[a] + (draw_between(&random, -64, 64) / 64.0);
+            const double through = ((double)pair_direct[2U * a] * u[0]) + ((double)pair_direct[(2U * a) + 1U] * u[1]);
+            const double S = variance[a] + (double)pair_R[a];
+            value[pair_signal[a]] = R((y + through) / (double)pair_gain[a]);
+            innovation[a] = y - estimate[a];
+            square += innovation[a] * innovation[a];
+            joint += innovation[a] * innovation[a] / S;
+            trace += S;
+        }
+        assert_status(HG_OK, hg_statistic_step(&self, value, radius, r, J));
+        assert_untouched(&memory[PAIR_REALS], 1U);
+        assert_near(sqrt(square), r[0], 1e-4);
+        assert_near(sqrt(joint), r[1], 1e-4);
+        assert_near(4.0 * sqrt(trace), J[0], 1e-4);
+        for (size_t a = 0U; a < PAIR; a++) {
+            const double gain = variance[a] / (variance[a] + (double)pair_R[a]);
+            const double push = ((double)pair_drive[2U * a] * u[0]) + ((double)pair_drive[(2U * a) + 1U] * u[1]);
+            const double decay = (double)pair_decay[a];
+            assert_near(estimate[a] + (gain * innovation[a]), self.filter.x[a], 1e-4);
+            estimate[a] = (decay * (estimate[a] + (gain * innovation[a]))) + push;
+            variance[a] = (decay * decay * variance[a] * (1.0 - gain)) + (double)pair_Q[a];
+            x[a] = (decay * x[a]) + push + (draw_between(&random, -64, 64) / 64.0);
+        }
+    }
+}
+
 /* x and P of a Kalman filter, then its prediction for the next sample. */
 static void kalman(rig *r, double y, double u)
 {
@@ -144,6 +251,7 @@ static void an_input_that_is_not_known_begins_anew(void **state)
     assert_real(0, r.r[1]);
     assert_real(0, r.r[2]);
     assert_real(4, r.J[0]);
+    assert_status(HG_OK, step(&r, 2000.0, 1.0, 0.0, 0.0079)); /* the filter is not asked at all */
     assert_status(HG_OK, step(&r, 0.5, 1.0, 0.0, 0.0)); /* as the first sample of all */
     assert_near(4.0 * sqrt(1.25), r.J[0], 1e-5);
     assert_near(0.4, r.self.filter.x[0], 1e-5);
@@ -191,6 +299,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(null_pointers_are_refused),
         cmocka_unit_test(tables_that_name_nothing_are_not_valid),
+        cmocka_unit_test(every_entry_of_a_list_is_looked_at),
+        cmocka_unit_test(two_plants_are_filtered_like_each_alone),
         cmocka_unit_test(a_known_input_moves_the_plant_and_the_filter_alike),
         cmocka_unit_test(a_radius_is_in_the_filters_unit),
         cmocka_unit_test(an_input_that_is_not_known_begins_anew),
