@@ -5,15 +5,15 @@ set -eu
 dest=$1
 release=trixie
 packages="cbmc libc6 libstdc++6 libgcc-s1 minisat zlib1g"
-programs="cbmc goto-cc"
+programs="cbmc goto-cc goto-instrument"
 keys=/usr/share/keyrings/debian-archive-keyring.gpg
 
-[ ! -x "$dest/bin/cbmc" ] || exit 0
+[ ! -x "$dest/bin/cbmc" ] || [ ! -x "$dest/bin/goto-instrument" ] || exit 0
 fail() { echo "cbmc.sh: $*" >&2; exit 2; }
 
-[ "$(uname -m)" = x86_64 ] || fail "CBMC is fetched for x86_64 only; put bin/cbmc and bin/goto-cc (6.6) below $dest"
+[ "$(uname -m)" = x86_64 ] || fail "CBMC is fetched for x86_64 only; put bin/cbmc, bin/goto-cc and bin/goto-instrument (6.6) below $dest"
 for tool in apt-get dpkg-deb tar; do
-    command -v "$tool" >/dev/null || fail "no $tool here: put bin/cbmc and bin/goto-cc (CBMC 6.6) below $dest"
+    command -v "$tool" >/dev/null || fail "no $tool here: put bin/cbmc, bin/goto-cc and bin/goto-instrument (CBMC 6.6) below $dest"
 done
 [ -r "$keys" ] || fail "no keys of Debian's archive in $keys: install debian-archive-keyring"
 mirror=$(apt-get indextargets --format '$(SITE)' 'Created-By: Packages' 'Codename: bookworm' 2>/dev/null | head -n 1)

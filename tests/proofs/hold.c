@@ -1,8 +1,6 @@
 /** @file
  *  hold.h: what the receiver knows between frames. */
-#include "proof.h"
-
-#include "hullguard/hold.h"
+#include "contract.h"
 
 #if HG_REAL_Q31
 
@@ -124,12 +122,28 @@ typedef struct {
     hg_real       middle[WIDTH];
 } tables;
 
-/** A hold takes any frames, losses and silences, of any valid tables: no overrun, radii finite and not negative, the value that of the last good frame, what is past rewritten
- *  only for samples that the slew's table knows; a second frame of a sample is refused.
- *  WIDTH channels, LEVELS levels, a slew table of up to HORIZON rows; any tables, middles finite; two samples after any state that samples can leave.
- *  @proves hg_hold_start hg_hold_receive hg_hold_lose hg_hold_step hg_hold_past hg_hold_rewrite hg_hold_doubt hg_hold_age hg_hold_health
- *  @run check real=f32 unwind=6 limit=150 WIDTH=1U LEVELS=1U HORIZON=3U LENGTH=3U
- *  @run deep real=f32 unwind=12 limit=3600 WIDTH=3U LEVELS=2U HORIZON=4U LENGTH=4U */
+static void any_state(hg_hold *self)
+{
+    self->age = any_u8();
+    self->good = any_u8();
+    self->level = any_u8();
+    self->silence = any_u8();
+    self->holes = any_bool();
+    self->seen = any_bool();
+    self->recovering = any_bool();
+    self->fresh = any_bool();
+    self->lost = any_bool();
+    self->doubt = any_bool();
+    self->gap = any_bool();
+    self->gap_age = any_u8();
+}
+
+/** A hold takes any frames, losses and silences, of any valid tables: no overrun, what is past rewritten only for samples that the slew's table knows; a second
+ *  frame of a sample is refused; and it is again in a state that samples can leave.
+ *  WIDTH channels, LEVELS levels, a slew table of HORIZON rows; any tables; a sample in any state that samples can leave.
+ *  @proves hg_hold_start hg_hold_receive hg_hold_lose hg_hold_step hg_hold_doubt hg_hold_age hg_hold_health
+ *  @run check real=f32 unwind=6 limit=150 WIDTH=1U LEVELS=1U HORIZON=3U
+ *  @run deep real=f32 unwind=12 limit=3600 WIDTH=3U LEVELS=2U HORIZON=4U */
 void proof_hold_step(void)
 {
     tables t;
@@ -157,46 +171,66 @@ void proof_hold_step(void)
     self.previous = previous;
     self.value = held;
     self.promise = promised;
-    self.age = any_u8();
-    self.good = any_u8_in(0U, 2U);
-    self.level = any_u8_in(0U, LEVELS - 1U);
-    self.silence = any_u8_in(0U, (uint8_t)(interval - 1U));
-    self.seen = any_bool();
-    self.holes = any_bool() || (!self.seen);
-    self.recovering = any_bool();
-    self.lost = any_bool();
-    self.doubt = any_bool();
-    /* Doubt is of silence within interval_max after a good frame, and of nothing older. */
-    assume((!self.doubt) || (self.seen && (!self.lost) && (self.age >= 1U) && (self.age < interval)));
+    any_state(&self);
+    assume(state_hold(&self));
     hg_real value[WIDTH];
     hg_real radius[WIDTH];
-    hg_real row[WIDTH];
-    hg_real memory[WIDTH * LENGTH];
-    hg_ring ring = {.data = memory, .width = WIDTH, .length = LENGTH, .newest = any_u8_in(0U, LENGTH - 1U)};
     int32_t code[WIDTH];
     uint8_t rewind;
     if (any_bool()) {
+        const hg_hold before = self;
         hg_hold_lose(&self);
+        prove(kept_hold(&self, &before) && state_hold(&self) && self.lost, "noted");
     }
     if (any_bool()) {
-        prove(hg_hold_receive(&self, code, any_bool()) == HG_OK, "booked");
-        prove(hg_hold_receive(&self, code, any_bool()) == HG_E_REPEATED, "one a sample");
-        prove((self.good >= 1U) && (self.level < LEVELS), "a level that there is");
-        reach("a frame");
+        const hg_hold before = self;
+        assume(requires_hold_receive(&self, code));
+        const hg_status status = hg_hold_receive(&self, code, any_bool());
+        prove(ensures_hold_receive(&self, &before, status), "one a sample");
+        if (status == HG_OK) {
+            reach("a frame");
+        }
     }
+    const hg_hold before = self;
+    assume(requires_hold_step(&self, value, radius, &rewind));
     hg_hold_step(&self, value, radius, &rewind);
-    prove((rewind == 0U) || (rewind < interval), "no further back than the sender may have been silent");
-    for (uint8_t lag = 1U; lag <= rewind; lag++) {
-        hg_hold_past(&self, lag, row);
-        reach("a past sample");
-    }
-    if (rewind > 0U) { /* what asks for it */
-        hg_hold_rewrite(&self, &ring, 0U, any_u8_in(0U, (rewind < LENGTH) ? rewind : (LENGTH - 1U)));
+    prove(ensures_hold_step(&self, &before, rewind), "no further back than the sender may have been silent");
+    if (rewind > 0U) {
+        reach("a past to rewrite");
     }
     prove((!hg_hold_doubt(&self)) || (hg_hold_age(&self) < interval), "doubt ends with the silence");
     prove((hg_hold_age(&self) >= 1U) || (self.good > 0U) || self.lost, "age 0 is that of a frame");
     prove((hg_hold_health(&self) >= HG_BUS_ABSENT) && (hg_hold_health(&self) <= HG_BUS_STALE), "one of four");
     prove(self.seen || (hg_hold_health(&self) == HG_BUS_ABSENT), "absent until the first");
+}
+
+/** What is past is rewritten only in the samples asked for, in the places of the group, and by no row that the slew's table does not have.
+ *  WIDTH channels, a slew table of HORIZON rows, a ring of LENGTH rows, in which the group has its place behind another; any state that samples can leave.
+ *  @proves hg_hold_past hg_hold_rewrite
+ *  @run check real=f32 unwind=6 limit=150 WIDTH=2U LEVELS=1U HORIZON=3U LENGTH=3U */
+void proof_hold_past(void)
+{
+    hg_trigger_config promise = {.width = WIDTH, .levels = LEVELS, .interval_max = any_u8_in(1U, HORIZON)};
+    const hg_hold_config config = {.trigger = &promise, .margin = (uint8_t)(HORIZON - promise.interval_max), .slew = any_array(hg_real, HORIZON * WIDTH), .span = any_array(hg_real, WIDTH)};
+    hg_hold self = {.config = &config, .sent = any_array(int32_t, WIDTH), .previous = any_array(int32_t, WIDTH), .value = any_array(hg_real, WIDTH), .promise = any_array(hg_real, WIDTH)};
+    any_state(&self);
+    hg_ring ring = {.data = any_array(hg_real, LENGTH * (WIDTH + 1U)), .width = WIDTH + 1U, .length = LENGTH, .newest = any_u8()};
+    const uint8_t row = any_u8_in(0U, LENGTH - 1U);
+    const hg_real *other = &ring.data[row * (WIDTH + 1U)];
+    const hg_real before = *other;
+    hg_real radius[WIDTH];
+    const uint8_t lag = any_u8();
+    const uint8_t lags = any_u8();
+    if (any_bool()) {
+        assume(requires_hold_past(&self, lag, radius));
+        hg_hold_past(&self, lag, radius);
+        reach("a past sample");
+    } else {
+        assume(requires_hold_rewrite(&self, &ring, 1U, lags));
+        hg_hold_rewrite(&self, &ring, 1U, lags);
+        prove((*other == before) || (before != before), "another group's radius");
+        reach("the past in a ring");
+    }
 }
 
 #endif

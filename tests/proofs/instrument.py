@@ -1,8 +1,8 @@
 """Copies of the library's sources in which every subscript of an array is checked: what the model checker sees in place of firmware/.
 
 CBMC checks a pointer against the whole object it points into, so that running from one member array of a struct into the next goes unseen. Here a[i]
-becomes a[PROOF_INDEX(a, i)] (tests/proofs/proof.h), which asserts that i is a place of a where a is an array, and is i where it is a pointer. Products and quotients become
-PROOF_TIMES(a, b) and PROOF_OVER(a, b), which are just that, or, for proofs that hold whatever a floating-point product is, any number. Lines stay as they are.
+becomes a[PROOF_INDEX(a, i)] (tests/proofs/proof.h), which asserts that i is a place of a where a is an array, and is i where it is a pointer. Products, quotients, sums and differences
+become PROOF_TIMES(a, b) and the like, which are just that, or, for proofs that hold whatever a floating-point result is, any number. Lines stay as they are.
 """
 
 from __future__ import annotations
@@ -50,19 +50,19 @@ def text_of(node: Node) -> str:
     return node.text.decode()
 
 
-_PRODUCTS = {"*": b"PROOF_TIMES", "/": b"PROOF_OVER", "*=": b"PROOF_TIMES", "/=": b"PROOF_OVER"}
+_ARITHMETIC = {"*": b"PROOF_TIMES", "/": b"PROOF_OVER", "+": b"PROOF_PLUS", "-": b"PROOF_MINUS"}
 _CONSTANT = ("preproc_if", "preproc_elif", "array_declarator", "enumerator")  # what the compiler computes
 
 
 def _rewritten(node: Node, source: bytes, constant: bool = False) -> bytes:
-    """Its text with every subscript and product in it checked."""
+    """Its text with every subscript in it checked and its arithmetic named."""
     left, operator, right = (node.child_by_field_name(name) for name in ("left", "operator", "right"))
     if node.type == "subscript_expression":
         array, index = (_rewritten(child, source, constant) for child in (node.child(0), node.child(2)) if child is not None)
         return b"%b[PROOF_INDEX(%b, %b)]" % (array, array, index)
-    if not constant and left is not None and right is not None and operator is not None and operator.type in _PRODUCTS:
-        product = b"%b(%b, %b)" % (_PRODUCTS[operator.type], _rewritten(left, source), _rewritten(right, source))
-        return product if node.type == "binary_expression" else _rewritten(left, source) + b" = " + product
+    if not constant and left is not None and right is not None and operator is not None and operator.type.removesuffix("=") in _ARITHMETIC:
+        result = b"%b(%b, %b)" % (_ARITHMETIC[operator.type.removesuffix("=")], _rewritten(left, source), _rewritten(right, source))
+        return result if node.type == "binary_expression" else _rewritten(left, source) + b" = " + result
     if not node.children:
         return source[node.start_byte : node.end_byte]
     out, at = b"", node.start_byte

@@ -1,6 +1,6 @@
 /** @file
  *  linalg.h, residual.h, mismatch.h, predict.h: linear systems. Numbers are any, NaN and infinity among them; sizes are those of a run. */
-#include "proof.h"
+#include "contract.h"
 
 #include "hullguard/linalg.h"
 #include "hullguard/mismatch.h"
@@ -122,11 +122,14 @@ void proof_residual_step(void)
     self.z = z;
     self.next = next;
     self.input = input;
+    assume(requires_residual_reset(&self));
     hg_residual_reset(&self);
     hg_real value[SIGNALS];
     hg_real r[RESIDUALS];
+    const hg_residual before = self;
+    assume(requires_residual_step(&self, value, r));
     const hg_status status = hg_residual_step(&self, value, r);
-    prove((status == HG_OK) || (status == HG_E_NUMERIC), "no other status");
+    prove(ensures_residual_step(&self, &before, status), "no other status, and its parts where they were");
     prove(hg_linalg_finite(self.z, ORDER) || (HG_REAL_Q31 != 0), "the state stays finite");
     prove((self.z == z) == (status != HG_OK), "it moves on, or nothing changes");
     (void)hg_residual_step(&self, value, r);
@@ -191,6 +194,7 @@ void proof_mismatch(void)
     const hg_mismatch_config config = {.states = states, .width = width, .exponent = any_i8(), .signal = any_bool() ? TAIL(signal, width) : NULL,
                                        .constant = any_bool() ? TAIL(constant, states) : NULL, .gain = any_bool() ? TAIL(gain, (size_t)states * width) : NULL};
     if (hg_mismatch_valid(&config, SIGNALS)) {
+        assume(requires_mismatch_step(&config, value, radius, TAIL(out, states)) && requires_mismatch_grow(&config, value, TAIL(out, states)));
         hg_mismatch_step(&config, value, radius, TAIL(out, states));
         if (states > 0U) {
             prove(TAIL(out, states)[any_u8_in(0U, (uint8_t)(states - 1U))] <= HG_REAL_MAX, "finite from above, and no NaN");
@@ -241,8 +245,10 @@ void proof_predict(void)
     self.next = next;
     self.u = u;
     self.y = y;
+    hg_predict before = self;
+    assume(requires_predict_reset(&self));
     hg_predict_reset(&self);
-    prove(!self.sure, "nothing predicted yet");
+    prove(ensures_predict_reset(&self, &before), "nothing predicted yet");
     self.k = any_u16();
     self.sure = any_bool();
     hg_real value[SIGNALS];
@@ -250,7 +256,10 @@ void proof_predict(void)
     hg_real out_value[RESIDUALS];
     hg_real out_radius[RESIDUALS];
     const uint8_t age = any_u8();
+    before = self;
+    assume(requires_predict_step(&self, value, radius, out_value, out_radius));
     hg_predict_step(&self, age, value, radius, out_value, out_radius);
+    prove(ensures_predict_step(&self, &before), "its parts where they were");
     const uint8_t g = any_u8_in(0U, RESIDUALS - 1U);
     const hg_real held = radius[config.first + g];
     prove((!hg_real_finite(held)) || (out_radius[g] <= held), "never wider");

@@ -70,14 +70,22 @@ static inline size_t proof_index(int64_t i, size_t length)
     return (size_t)i;
 }
 
-/* Products and quotients. With ANY_NUMBERS those of floating-point numbers are any: what is proven then holds whatever they are, and the solver is spared them. Memory safety,
-   and that what enters a state is finite, hold that way; values do not. */
+/* Arithmetic. With ANY_NUMBERS floating-point products and quotients are any, with ANY_SUMS sums and differences, too: what is proven then holds whatever they are, and the solver is
+   spared them. Memory safety, and that what enters a state is finite where a comparison says so, hold that way; values do not. */
+#define PROOF_ANY(result) _Generic((result), float: nondet_float(), double: nondet_double(), default: (result))
 #ifdef ANY_NUMBERS
-#define PROOF_TIMES(a, b) _Generic((a) * (b), float: nondet_float(), double: nondet_double(), default: (a) * (b))
-#define PROOF_OVER(a, b) _Generic((a) / (b), float: nondet_float(), double: nondet_double(), default: (a) / (b))
+#define PROOF_TIMES(a, b) PROOF_ANY((a) * (b))
+#define PROOF_OVER(a, b) PROOF_ANY((a) / (b))
 #else
 #define PROOF_TIMES(a, b) ((a) * (b))
 #define PROOF_OVER(a, b) ((a) / (b))
+#endif
+#ifdef ANY_SUMS
+#define PROOF_PLUS(a, b) PROOF_ANY((a) + (b))
+#define PROOF_MINUS(a, b) PROOF_ANY((a) - (b))
+#else
+#define PROOF_PLUS(a, b) ((a) + (b))
+#define PROOF_MINUS(a, b) ((a) - (b))
 #endif
 
 #endif

@@ -4,6 +4,7 @@ A proof is a C function proof_X(), and what the comment before it says:
 
     @proves FUNCTION ..     of the library; every public function must be in some proof, or in exceptions.txt with a reason
     @run check|deep real=f32|f64|q31 unwind=N limit=SECONDS [LOOP:N ..] [NAME=NUMBER ..]    once each; processor time; sizes are macros of the proof, or HG_* of the library
+    @stub FUNCTION ..       calls of these go to stub_FUNCTION() of stubs.h in their place, which knows of them only what another proof shows: see contract.h
     @with CHECK ..          also this check of CBMC
     @without CHECK: WHY     without it
 
@@ -31,6 +32,7 @@ from pathlib import Path
 from threading import Lock
 
 from instrument import InstrumentError, instrument, nodes, parse, text_of
+from tree_sitter import Node
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "promises"))
 from result import write
@@ -42,7 +44,7 @@ TOOLS = BUILD.parent / "tools/cbmc/bin"
 MEMORY = 8 << 30  # of one run, bytes
 
 CHECKS = ("bounds", "pointer", "pointer-overflow", "div-by-zero", "signed-overflow", "unsigned-overflow", "conversion", "undefined-shift")
-LIBRARY = ("HG_", "ANY_NUMBERS")  # macros that the library is compiled with, too
+LIBRARY = ("HG_", "ANY_")  # macros that the library is compiled with, too
 SHOWN = 8  # of what is wrong with one run
 REACH = "reachable: "
 PROPERTY = re.compile(r"^\[([^\]]+)\] line \d+ (.*): (SUCCESS|FAILURE|UNKNOWN|ERROR)$", re.MULTILINE)
@@ -80,6 +82,8 @@ class Proof:
     proves: tuple[str, ...]
     runs: tuple[Run, ...]
     checks: tuple[str, ...]
+    stubs: tuple[str, ...] = ()
+    reached: frozenset[str] = frozenset()  # names that it uses, directly or by helpers of its file
     others: tuple[str, ...] = ()  # sizes of all proofs of the file: 1 where a run does not name them
 
 
@@ -125,11 +129,14 @@ def proof_of(source: Path, name: str, comment: str) -> Proof:
     lines = [re.sub(r"^\s*/?\*+/?\s?", "", line).removesuffix("*/").strip() for line in comment.splitlines()]
     checks = list(CHECKS)
     proves: list[str] = []
+    stubs: list[str] = []
     runs: list[Run] = []
     for line in lines:
         tag, _, rest = line.partition(" ")
         if tag == "@proves":
             proves += rest.split()
+        elif tag == "@stub":
+            stubs += rest.split()
         elif tag == "@run":
             runs.append(run_of(rest.split(), where))
         elif tag == "@with":
@@ -144,37 +151,70 @@ def proof_of(source: Path, name: str, comment: str) -> Proof:
     says = " ".join(line for line in lines if line and not line.startswith("@"))
     if not says or not proves or not runs:
         raise ProofError(f"{where}: the comment wants a sentence of what is proven, @proves and @run")
-    return Proof(source, name, says, tuple(proves), tuple(runs), tuple(checks))
+    return Proof(source, name, says, tuple(proves), tuple(runs), tuple(checks), tuple(stubs))
+
+
+def names_in(root: Node) -> dict[str, set[str]]:
+    """Each function of a file, and all names in it but its own."""
+    found: dict[str, set[str]] = {}
+    for node in nodes(root):
+        if node.type == "function_definition":
+            name = text_of(declarator_of(node))
+            found[name] = {text_of(n) for n in nodes(node) if n.type == "identifier"} - {name}
+    return found
+
+
+def declarator_of(function: Node) -> Node:
+    """The name of a function that is defined."""
+    declarator = next(n for n in nodes(function) if n.type == "function_declarator").child_by_field_name("declarator")
+    assert declarator is not None
+    return declarator
+
+
+def reached_from(name: str, names: dict[str, set[str]]) -> frozenset[str]:
+    """The names in a function and in all functions of its file that it reaches."""
+    reached, waiting = set[str](), [name]
+    while waiting:
+        new = names.get(waiting.pop(), set()) - reached
+        reached |= new
+        waiting += new
+    return frozenset(reached)
 
 
 def proofs_in(source: Path) -> list[Proof]:
     """All proofs of a file; each must call what it says it proves, directly or by helpers of the file."""
     root = parse(source).root_node
-    called: dict[str, set[str]] = {}
-    found: list[tuple[str, str]] = []
+    names = names_in(root)
+    proofs = []
     for node in nodes(root):
-        if node.type == "function_definition":
-            declarator = next(n for n in nodes(node) if n.type == "function_declarator").child_by_field_name("declarator")
-            assert declarator is not None
-            name = text_of(declarator)
-            called[name] = {text_of(n) for n in nodes(node) if n.type == "identifier"} - {name}
-            if name.startswith("proof_"):
-                before = node.prev_sibling
-                found.append((name, text_of(before) if before is not None and before.type == "comment" else ""))
-    proofs = [proof_of(source, name, says) for name, says in found]
+        if node.type == "function_definition" and (name := text_of(declarator_of(node))).startswith("proof_"):
+            before = node.prev_sibling
+            proof = proof_of(source, name, text_of(before) if before is not None and before.type == "comment" else "")
+            proofs.append(replace(proof, reached=reached_from(name, names)))
     sizes = {d.partition("=")[0] for p in proofs for r in p.runs for d in r.defines if re.fullmatch(r"[A-Z]+=\d+U?", d)}
     proofs = [replace(p, others=tuple(sorted(sizes))) for p in proofs]
     for proof in proofs:
-        reached, waiting = set[str](), [proof.name]
-        while waiting:
-            new = called.get(waiting.pop(), set()) - reached
-            reached |= new
-            waiting += new
-        if idle := [f for f in proof.proves if f not in reached]:
+        if idle := [f for f in proof.proves if f not in proof.reached]:
             raise ProofError(f"{source.name}: {proof.name} says it proves {', '.join(idle)} and does not call it")
-        if "reach" not in reached:
+        if both := set(proof.proves) & set(proof.stubs):
+            raise ProofError(f"{source.name}: {proof.name} says it proves {', '.join(both)} and has a stub in its place")
+        if "reach" not in proof.reached:
             raise ProofError(f"{source.name}: {proof.name} has no reach(): nothing tells whether any input is left")
     return proofs
+
+
+def check_stubs(proofs: Sequence[Proof]) -> None:
+    """What a stub asserts and assumes stands in a proof of the function that it replaces, the other way round: both call the same requires_ and ensures_ of contract.h."""
+    names = names_in(parse(HERE / "stubs.h").root_node)
+    for name in sorted({f for p in proofs for f in p.stubs}):
+        if f"stub_{name}" not in names:
+            raise ProofError(f"{name}() has no stub_{name}() in tests/proofs/stubs.h")
+        contract = {n for n in reached_from(f"stub_{name}", names) if n.startswith(("requires_", "ensures_"))}
+        proven = [p for p in proofs if name in p.proves]
+        if not contract or not proven:
+            raise ProofError(f"the stub of {name}() rests on nothing: it wants a contract, and a proof of the function")
+        if not any(contract <= p.reached and any(r.kind == "check" for r in p.runs) for p in proven):
+            raise ProofError(f"no proof of {name}() calls all of {', '.join(sorted(contract))}: what its stub assumes is not proven")
 
 
 def public_functions() -> set[str]:
@@ -220,6 +260,15 @@ def compile_goto(sources: Sequence[Path], output: Path, defines: Sequence[str], 
     partial.rename(output)
 
 
+def replace_calls(program: Path, output: Path, functions: Sequence[str]) -> Path:
+    """The program with stubs in place of some functions, everywhere."""
+    calls = [word for f in functions for word in ("--replace-calls", f"{f}:stub_{f}")]
+    done = subprocess.run([TOOLS / "goto-instrument", *calls, program, output], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise ProofError(f"{output.name}: calls cannot be replaced:\n{done.stdout}{done.stderr}")
+    return output
+
+
 _compiling = Lock()
 
 
@@ -243,10 +292,11 @@ def command_of(proof: Proof, run: Run) -> list[str]:
         ones = [f"{size}=1U" for size in proof.others if not any(d.startswith(f"{size}=") for d in own)]
         compile_goto([proof.source], folder / "proof.o", (*run.library, *own, *ones))
         compile_goto([folder / "proof.o", *objects], folder / "all.goto", (), link=True)
+        program = replace_calls(folder / "all.goto", folder / f"{proof.name}.goto", proof.stubs) if proof.stubs else folder / "all.goto"
     flags = [f"--{check}-check" for check in proof.checks]
     loops = ["--unwindset", ",".join(run.loops)] if run.loops else []
     return [
-        str(TOOLS / "cbmc"), str(folder / "all.goto"), "--function", proof.name, "--no-standard-checks", "--unwinding-assertions", "--no-malloc-may-fail",
+        str(TOOLS / "cbmc"), str(program), "--function", proof.name, "--no-standard-checks", "--unwinding-assertions", "--no-malloc-may-fail",
         "--drop-unused-functions", "--slice-formula", "--object-bits", "10", "--unwind", str(run.unwind), *loops, *flags,
     ]  # fmt: skip
 
@@ -339,6 +389,7 @@ def main() -> int:
             return 0
         if not chosen:
             raise ProofError(f"no proof has one of these in its name: {' '.join(options.names)}")
+        check_stubs(every)
         if not options.names:
             check_coverage(every)
         subscripts = prepare()

@@ -1,0 +1,337 @@
+/** @file
+ *  Contracts: what a function of the library asks for and what it gives, each said once.
+ *
+ *  A large function is proven with stubs (stubs.h) in place of what it calls. A stub asserts requires_X(), writes anything into all that X may write, and assumes
+ *  ensures_X(); a proof of X assumes requires_X() of any state and proves ensures_X(). So nothing is assumed anywhere that is not proven elsewhere, and proofs.py looks
+ *  whether both sides call the same. What X may write is seen by its proof, too: there its outputs and the parts of its state are memory of their own, so that
+ *  anything further is outside of any object; and what a stub leaves of a state as it was stands in ensures_X() or is said there to be unchanged.
+ *  state_x() is what holds of a started x between two calls: every start and every step proves it, every step may rely on it. */
+#ifndef HULLGUARD_CONTRACT_H
+#define HULLGUARD_CONTRACT_H
+
+#include "proof.h"
+
+#include "hullguard/detector.h"
+
+#include <stdlib.h>
+
+/* An array of any content and an object of its own, of exactly this length: tables and memory of a proof. */
+#define any_array(type, count) ((type *)malloc(sizeof(type) * (count)))
+
+/* So many things can be read, or read and written, there; of none nothing is asked. */
+#define readable(pointer, count) (((count) == 0U) || __CPROVER_r_ok((pointer), (count) * sizeof(*(pointer))))
+#define writable(pointer, count) (((count) == 0U) || __CPROVER_rw_ok((pointer), (count) * sizeof(*(pointer))))
+
+/* ---- ring.h ---- */
+
+static inline bool state_ring(const hg_ring *self)
+{
+    return (self->width >= 1U) && (self->length >= 1U) && (self->newest < self->length) && writable(self->data, HG_RING_REALS(self->width, self->length));
+}
+
+/* ---- hold.h ---- */
+
+static inline bool state_hold(const hg_hold *self)
+{
+    const hg_trigger_config *trigger = self->config->trigger;
+    const uint8_t width = trigger->width;
+    return (self->good <= 2U) && (self->level < trigger->levels) && (self->silence < trigger->interval_max) && (self->seen || (self->holes && (self->age == UINT8_MAX))) &&
+           ((!self->fresh) || (self->seen && (self->good >= 1U))) && ((!self->gap) || (self->seen && (self->gap_age >= 1U))) &&
+           /* Doubt is of silence within interval_max after a good frame, and of nothing older. */
+           ((!self->doubt) || (self->seen && (self->age >= 1U) && (self->age < trigger->interval_max))) && writable(self->sent, width) && writable(self->previous, width) &&
+           writable(self->value, width) && writable(self->promise, width);
+}
+
+static inline bool kept_hold(const hg_hold *self, const hg_hold *before)
+{
+    return (self->config == before->config) && (self->sent == before->sent) && (self->previous == before->previous) && (self->value == before->value) && (self->promise == before->promise);
+}
+
+static inline bool requires_hold_start(const hg_hold_config *config, const int32_t *codes, const hg_real *reals)
+{
+    /* Nothing of a table that is not there; else as many numbers as its sizes say. */
+    return (config->trigger == NULL) || (!hg_trigger_valid(config->trigger)) || (writable(codes, HG_HOLD_CODES(config->trigger->width)) && writable(reals, HG_HOLD_REALS(config->trigger->width)));
+}
+
+static inline bool ensures_hold_start(const hg_hold *self, const hg_hold_config *config, const int32_t *codes, const hg_real *reals, hg_status status)
+{
+    if (status != HG_OK) {
+        return status == HG_E_CONFIG;
+    }
+    const uint8_t width = config->trigger->width;
+    return (self->config == config) && hg_trigger_valid(config->trigger) && (self->sent == codes) && (self->previous == &codes[width]) && (self->value == reals) &&
+           (self->promise == &reals[width]) && state_hold(self) && (!self->fresh);
+}
+
+static inline bool requires_hold_receive(const hg_hold *self, const int32_t *code)
+{
+    return state_hold(self) && readable(code, self->config->trigger->width);
+}
+
+static inline bool ensures_hold_receive(const hg_hold *self, const hg_hold *before, hg_status status)
+{
+    return kept_hold(self, before) && state_hold(self) && (status == (before->fresh ? HG_E_REPEATED : HG_OK)) && self->fresh;
+}
+
+static inline bool requires_hold_step(const hg_hold *self, const hg_real *value, const hg_real *radius, const uint8_t *rewind)
+{
+    const uint8_t width = self->config->trigger->width;
+    return state_hold(self) && writable(value, width) && writable(radius, width) && writable(rewind, 1U);
+}
+
+static inline bool ensures_hold_step(const hg_hold *self, const hg_hold *before, uint8_t rewind)
+{
+    /* Rewound no further than the sender may have been silent: hg_hold_past() reads the slew's table for it. */
+    const bool known = (rewind == 0U) || ((self->gap_age == (rewind + 1U)) && (self->gap_age <= self->config->trigger->interval_max));
+    return kept_hold(self, before) && state_hold(self) && (!self->fresh) && known;
+}
+
+static inline bool requires_hold_past(const hg_hold *self, uint8_t lag, const hg_real *radius)
+{
+    return state_hold(self) && (lag >= 1U) && (lag < self->gap_age) && (self->gap_age <= self->config->trigger->interval_max) && writable(radius, self->config->trigger->width);
+}
+
+static inline bool requires_hold_rewrite(const hg_hold *self, const hg_ring *ring, uint8_t first, uint8_t lags)
+{
+    return state_hold(self) && state_ring(ring) && ((first + self->config->trigger->width) <= ring->width) && (lags < ring->length) &&
+           (lags < self->gap_age) && (self->gap_age <= self->config->trigger->interval_max);
+}
+
+/* ---- predict.h, mismatch.h ---- */
+
+static inline bool state_predict(const hg_predict *self)
+{
+    const hg_predict_config *config = self->config;
+    return writable(self->x, config->order) && writable(self->next, config->order) && writable(self->u, config->inputs) && writable(self->y, config->width);
+}
+
+/* x and its scratch change places. */
+static inline bool kept_predict(const hg_predict *self, const hg_predict *before)
+{
+    const bool same = (self->x == before->x) && (self->next == before->next);
+    const bool swapped = (self->x == before->next) && (self->next == before->x);
+    return (self->config == before->config) && (same || swapped) && (self->u == before->u) && (self->y == before->y);
+}
+
+static inline bool requires_predict_reset(const hg_predict *self)
+{
+    return state_predict(self);
+}
+
+static inline bool ensures_predict_reset(const hg_predict *self, const hg_predict *before)
+{
+    return kept_predict(self, before) && (self->x == before->x) && (!self->sure);
+}
+
+static inline bool requires_predict_step(const hg_predict *self, const hg_real *value, const hg_real *radius, const hg_real *out_value, const hg_real *out_radius)
+{
+    const hg_predict_config *config = self->config;
+    const uint32_t end = (uint32_t)config->first + config->width;
+    bool there = state_predict(self) && hg_predict_valid(config, UINT8_MAX) && readable(value, end) && readable(radius, end);
+    for (uint8_t i = 0U; i < config->inputs; i++) {
+        there = there && readable(&value[config->input[i]], 1U) && readable(&radius[config->input[i]], 1U);
+    }
+    return there && writable(out_value, config->width) && writable(out_radius, config->width);
+}
+
+static inline bool ensures_predict_step(const hg_predict *self, const hg_predict *before)
+{
+    return kept_predict(self, before) && state_predict(self);
+}
+
+static inline bool requires_mismatch_grow(const hg_mismatch_config *config, const hg_real *increase, const hg_real *out)
+{
+    bool there = hg_mismatch_valid(config, UINT8_MAX) && writable(out, config->states);
+    for (uint8_t g = 0U; (config->states > 0U) && (g < config->width); g++) {
+        there = there && readable(&increase[config->signal[g]], 1U);
+    }
+    return there;
+}
+
+static inline bool requires_mismatch_step(const hg_mismatch_config *config, const hg_real *value, const hg_real *radius, const hg_real *out)
+{
+    return requires_mismatch_grow(config, value, out) && requires_mismatch_grow(config, radius, out);
+}
+
+/* ---- residual.h ---- */
+
+static inline bool state_residual(const hg_residual *self)
+{
+    const hg_residual_config *config = self->config;
+    return hg_residual_valid(config) && writable(self->z, config->order) && writable(self->next, config->order) && writable(self->input, config->width);
+}
+
+static inline bool requires_residual_reset(const hg_residual *self)
+{
+    return writable(self->z, self->config->order);
+}
+
+static inline bool requires_residual_step(const hg_residual *self, const hg_real *value, const hg_real *r)
+{
+    const hg_residual_config *config = self->config;
+    bool there = state_residual(self) && writable(r, config->residuals);
+    for (uint8_t g = 0U; g < config->width; g++) {
+        there = there && readable(&value[config->signal[g]], 1U);
+    }
+    return there;
+}
+
+static inline bool ensures_residual_step(const hg_residual *self, const hg_residual *before, hg_status status)
+{
+    const bool same = (self->z == before->z) && (self->next == before->next);
+    const bool swapped = (self->z == before->next) && (self->next == before->z);
+    return ((status == HG_OK) || (status == HG_E_NUMERIC)) && (self->config == before->config) && ((status == HG_OK) ? swapped : same) && (self->input == before->input);
+}
+
+/* ---- hull.h, zonotope.h ---- */
+
+static inline bool requires_hull_reset(const hg_hull *self)
+{
+    return writable(self->theta, self->config->residuals) && writable(self->mode, self->config->modes);
+}
+
+static inline bool ensures_hull_reset(const hg_hull *self, const hg_hull *before)
+{
+    return (self->config == before->config) && (self->theta == before->theta) && (self->mode == before->mode) && (self->k == 0U);
+}
+
+static inline bool requires_hull_step(const hg_hull *self, const hg_ring *ring, const hg_real *J)
+{
+    return state_ring(ring) && hg_hull_valid(self->config, ring->width, ring->length) && requires_hull_reset(self) && writable(J, self->config->residuals);
+}
+
+static inline bool ensures_hull_step(const hg_hull *self, const hg_hull *before)
+{
+    return (self->config == before->config) && (self->theta == before->theta) && (self->mode == before->mode) && (self->how == before->how) &&
+           (self->k == ((before->k < UINT16_MAX) ? (before->k + 1U) : UINT16_MAX));
+}
+
+#if HG_WITH_ZONOTOPE
+static inline bool requires_zonotope_reset(const hg_zonotope *self)
+{
+    const hg_zonotope_config *config = self->config;
+    const uint32_t most = (uint32_t)config->columns + config->width + config->disturbances;
+    return writable(self->column, most * config->order) && writable(self->score, most) && writable(self->spread, config->order) && writable(self->scratch, config->order);
+}
+
+static inline bool state_zonotope(const hg_zonotope *self, uint8_t signals)
+{
+    return hg_zonotope_valid(self->config, signals) && requires_zonotope_reset(self) && (self->count <= self->config->columns);
+}
+
+static inline bool ensures_zonotope(const hg_zonotope *self, const hg_zonotope *before)
+{
+    return (self->config == before->config) && (self->column == before->column) && (self->score == before->score) && (self->spread == before->spread) &&
+           (self->scratch == before->scratch) && (self->count <= self->config->columns);
+}
+
+static inline bool requires_zonotope_widen(const hg_zonotope *self, uint8_t count, const hg_real *increase)
+{
+    return state_zonotope(self, UINT8_MAX) && readable(increase, count);
+}
+
+static inline bool requires_zonotope_step(const hg_zonotope *self, const hg_ring *ring, const hg_real *J)
+{
+    return state_ring(ring) && state_zonotope(self, ring->width) && writable(J, self->config->residuals);
+}
+#endif
+
+/* ---- bank.h ---- */
+
+static inline bool requires_bank_reset(const hg_bank *self)
+{
+    return writable(self->sum, HG_BANK_SUMS(self->config->certificates));
+}
+
+static inline bool ensures_bank_reset(const hg_bank *self, const hg_bank *before)
+{
+    return (self->config == before->config) && (self->sum == before->sum) && (self->k == 0U) && (self->closest == 0U);
+}
+
+static inline bool requires_bank_step(const hg_bank *self, const hg_ring *value, const hg_ring *radius, const hg_real *r, const hg_real *J)
+{
+    return state_ring(value) && state_ring(radius) && hg_bank_valid(self->config, value->width, radius->width, value->length) && (self->config->window <= radius->length) &&
+           requires_bank_reset(self) && writable(r, 1U) && writable(J, 1U);
+}
+
+static inline bool ensures_bank_step(const hg_bank *self, const hg_bank *before, hg_status status)
+{
+    return (self->config == before->config) && (self->sum == before->sum) && (self->k <= self->config->window) && (self->closest < self->config->certificates) &&
+           ((status == HG_OK) || (status == HG_E_EMPTY) || (status == HG_E_NUMERIC));
+}
+
+/* ---- detector.h ---- */
+
+/* Places of group i's signals in the vector: from here on. */
+static inline uint32_t first_of(const hg_detector_config *config, uint8_t group)
+{
+    uint32_t first = 0U;
+    for (uint8_t i = 0U; i < group; i++) {
+        first += config->hold[i].trigger->width;
+    }
+    return first;
+}
+
+/* What hg_detector_start() accepts, of groups and what is derived from their signals, */
+static inline bool valid_signals(const hg_detector_config *config)
+{
+    uint32_t width = config->signals;
+    bool valid = (config->groups >= 1U) && (config->groups <= HG_GROUPS_MAX) && (config->history >= 1U) && (first_of(config, config->groups) == config->signals);
+    for (uint8_t i = 0U; i < config->predictors; i++) {
+        const hg_predict_config *predict = &config->predict[i];
+        valid = valid && (predict->group < config->groups) && hg_predict_valid(predict, config->signals) && (predict->first == first_of(config, predict->group)) &&
+                (predict->width == config->hold[predict->group].trigger->width);
+        width += predict->width;
+    }
+    if (config->mismatch != NULL) {
+        valid = valid && hg_mismatch_valid(config->mismatch, config->signals);
+        width += config->mismatch->states;
+    }
+    return valid && (width == config->width);
+}
+
+/* and of generators and banks. */
+static inline bool valid_judges(const hg_detector_config *config)
+{
+    uint32_t residuals = config->banks + (HG_STATISTICS * (uint32_t)config->polynomials);
+    bool valid = (((uint32_t)config->generators + config->banks + config->polynomials) == config->decision.generators) && (config->decision.generators <= HG_GENERATORS_MAX);
+    for (uint8_t g = 0U; g < config->generators; g++) {
+        const hg_residual_config *residual = &config->residual[g];
+        valid = valid && hg_residual_valid(residual);
+        for (uint8_t i = 0U; valid && (i < residual->width); i++) {
+            valid = residual->signal[i] < config->width;
+        }
+        if (config->hull != NULL) {
+            valid = valid && hg_hull_valid(&config->hull[g], config->width, config->history) && (config->hull[g].residuals == residual->residuals);
+        }
+#if HG_WITH_ZONOTOPE
+        if (config->hull == NULL) {
+            valid = valid && hg_zonotope_valid(&config->zonotope[g], config->width) && (config->zonotope[g].residuals == residual->residuals);
+        }
+#endif
+        residuals += residual->residuals;
+    }
+    for (uint8_t b = 0U; b < config->banks; b++) {
+        valid = valid && (config->bank[b].window <= config->history) && hg_bank_valid(&config->bank[b], config->signals, config->width, config->window);
+    }
+    return valid && (residuals == config->residuals);
+}
+
+/* Where a detector's own numbers are, and that its rings are in step with its tables. */
+static inline bool state_detector(const hg_detector *self)
+{
+    const hg_detector_config *config = self->config;
+    bool there = writable(self->value, config->width) && writable(self->r, config->residuals) && writable(self->J, config->residuals) && writable(self->past, config->width);
+    there = there && state_ring(&self->radii) && (self->radii.width == config->width) && (self->radii.length == config->history);
+    return there && ((config->banks == 0U) || (state_ring(&self->values) && (self->values.width == config->signals) && (self->values.length == config->window)));
+}
+
+static inline bool ensures_detector_receive(const hg_detector *self, uint8_t group, hg_status status)
+{
+    if (group >= self->config->groups) {
+        return status == HG_E_ARGUMENT;
+    }
+    return ((status == HG_OK) || (status == HG_E_REPEATED) || (status == HG_E_NUMERIC)) && state_hold(&self->memory.hold[group]);
+}
+
+#endif

@@ -1,0 +1,240 @@
+/** @file
+ *  Stand-ins for functions of the library in the proofs of those that call them (@stub FUNCTION puts stub_FUNCTION() in its place): each asserts that it is called as
+ *  contract.h requires, writes anything into all that the function may write, and gives anything that contract.h ensures. */
+#ifndef HULLGUARD_STUBS_H
+#define HULLGUARD_STUBS_H
+
+#include "contract.h"
+
+static void write_reals(hg_real *x, uint32_t count)
+{
+    for (uint32_t i = 0U; i < count; i++) {
+        hg_real any;
+        x[i] = any;
+    }
+}
+
+static void write_codes(int32_t *x, uint32_t count)
+{
+    for (uint32_t i = 0U; i < count; i++) {
+        x[i] = any_i32();
+    }
+}
+
+static hg_status any_status(void)
+{
+    return (hg_status)any_i8();
+}
+
+/* ---- hold.h ---- */
+
+/* Anything but where its parts are, and anything in these. */
+static void write_hold(hg_hold *self)
+{
+    const hg_hold before = *self;
+    const uint8_t width = self->config->trigger->width;
+    *self = (hg_hold){.config = before.config, .sent = before.sent, .previous = before.previous, .value = before.value, .promise = before.promise, .age = any_u8(), .good = any_u8(),
+                      .level = any_u8(), .silence = any_u8(), .holes = any_bool(), .seen = any_bool(), .recovering = any_bool(), .fresh = any_bool(), .lost = any_bool(),
+                      .doubt = any_bool(), .gap = any_bool(), .gap_age = any_u8()};
+    write_codes(self->sent, width);
+    write_codes(self->previous, width);
+    write_reals(self->value, width);
+    write_reals(self->promise, width);
+}
+
+hg_status stub_hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
+{
+    prove(requires_hold_receive(self, code), "contract of hg_hold_receive()");
+    (void)continues;
+    const hg_hold before = *self;
+    const hg_status status = any_status();
+    write_hold(self);
+    assume(ensures_hold_receive(self, &before, status));
+    return status;
+}
+
+void stub_hg_hold_step(hg_hold *self, hg_real *value, hg_real *radius, uint8_t *rewind)
+{
+    prove(requires_hold_step(self, value, radius, rewind), "contract of hg_hold_step()");
+    const hg_hold before = *self;
+    write_hold(self);
+    write_reals(value, self->config->trigger->width);
+    write_reals(radius, self->config->trigger->width);
+    *rewind = any_u8();
+    assume(ensures_hold_step(self, &before, *rewind));
+}
+
+void stub_hg_hold_past(const hg_hold *self, uint8_t lag, hg_real *radius)
+{
+    prove(requires_hold_past(self, lag, radius), "contract of hg_hold_past()");
+    write_reals(radius, self->config->trigger->width);
+}
+
+void stub_hg_hold_rewrite(const hg_hold *self, hg_ring *ring, uint8_t first, uint8_t lags)
+{
+    prove(requires_hold_rewrite(self, ring, first, lags), "contract of hg_hold_rewrite()");
+    write_reals(ring->data, HG_RING_REALS(ring->width, ring->length));
+}
+
+/* ---- predict.h, mismatch.h ---- */
+
+void stub_hg_predict_reset(hg_predict *self)
+{
+    prove(requires_predict_reset(self), "contract of hg_predict_reset()");
+    const hg_predict before = *self;
+    self->k = any_u16();
+    self->sure = any_bool();
+    write_reals(self->x, self->config->order);
+    assume(ensures_predict_reset(self, &before));
+}
+
+void stub_hg_predict_step(hg_predict *self, uint8_t age, const hg_real *value, const hg_real *radius, hg_real *out_value, hg_real *out_radius)
+{
+    prove(requires_predict_step(self, value, radius, out_value, out_radius), "contract of hg_predict_step()");
+    (void)age;
+    const hg_predict before = *self;
+    const bool swapped = any_bool();
+    *self = (hg_predict){.config = before.config, .x = swapped ? before.next : before.x, .next = swapped ? before.x : before.next, .u = before.u, .y = before.y, .k = any_u16(), .sure = any_bool()};
+    write_reals(self->x, self->config->order);
+    write_reals(self->next, self->config->order);
+    write_reals(self->u, self->config->inputs);
+    write_reals(self->y, self->config->width);
+    write_reals(out_value, self->config->width);
+    write_reals(out_radius, self->config->width);
+    assume(ensures_predict_step(self, &before));
+}
+
+void stub_hg_mismatch_step(const hg_mismatch_config *config, const hg_real *value, const hg_real *radius, hg_real *out)
+{
+    prove(requires_mismatch_step(config, value, radius, out), "contract of hg_mismatch_step()");
+    write_reals(out, config->states);
+}
+
+void stub_hg_mismatch_grow(const hg_mismatch_config *config, const hg_real *increase, hg_real *out)
+{
+    prove(requires_mismatch_grow(config, increase, out), "contract of hg_mismatch_grow()");
+    write_reals(out, config->states);
+}
+
+/* ---- residual.h ---- */
+
+void stub_hg_residual_reset(hg_residual *self)
+{
+    prove(requires_residual_reset(self), "contract of hg_residual_reset()");
+    write_reals(self->z, self->config->order);
+}
+
+hg_status stub_hg_residual_step(hg_residual *self, const hg_real *value, hg_real *r)
+{
+    prove(requires_residual_step(self, value, r), "contract of hg_residual_step()");
+    const hg_residual before = *self;
+    const hg_status status = any_bool() ? HG_OK : HG_E_NUMERIC;
+    if (status == HG_OK) {
+        self->z = before.next;
+        self->next = before.z;
+    }
+    write_reals(self->z, self->config->order);
+    write_reals(self->next, self->config->order);
+    write_reals(self->input, self->config->width);
+    write_reals(r, self->config->residuals);
+    assume(ensures_residual_step(self, &before, status));
+    return status;
+}
+
+/* ---- hull.h, zonotope.h ---- */
+
+static void write_hull(hg_hull *self)
+{
+    self->k = any_u16();
+    self->how = (hg_start)any_u8();
+    write_reals(self->theta, self->config->residuals);
+    write_reals(self->mode, self->config->modes);
+}
+
+void stub_hg_hull_reset(hg_hull *self, hg_start how)
+{
+    prove(requires_hull_reset(self), "contract of hg_hull_reset()");
+    (void)how;
+    const hg_hull before = *self;
+    write_hull(self);
+    assume(ensures_hull_reset(self, &before));
+}
+
+void stub_hg_hull_step(hg_hull *self, const hg_ring *ring, hg_real *J)
+{
+    prove(requires_hull_step(self, ring, J), "contract of hg_hull_step()");
+    const hg_hull before = *self;
+    write_hull(self);
+    write_reals(J, self->config->residuals);
+    assume(ensures_hull_step(self, &before));
+}
+
+#if HG_WITH_ZONOTOPE
+static void write_zonotope(hg_zonotope *self)
+{
+    const hg_zonotope_config *config = self->config;
+    const hg_zonotope before = *self;
+    const uint32_t most = (uint32_t)config->columns + config->width + config->disturbances;
+    hg_real size;
+    *self = (hg_zonotope){.config = config, .column = before.column, .score = before.score, .spread = before.spread, .scratch = before.scratch, .size = size, .count = any_u16(),
+                          .lost = any_u16(), .k = any_u16(), .how = (hg_start)any_u8()};
+    write_reals(self->column, most * config->order);
+    write_reals(self->score, most);
+    write_reals(self->spread, config->order);
+    write_reals(self->scratch, config->order);
+    assume(ensures_zonotope(self, &before));
+}
+
+void stub_hg_zonotope_reset(hg_zonotope *self, hg_start how)
+{
+    prove(requires_zonotope_reset(self), "contract of hg_zonotope_reset()");
+    (void)how;
+    write_zonotope(self);
+}
+
+void stub_hg_zonotope_widen(hg_zonotope *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *increase)
+{
+    prove(requires_zonotope_widen(self, count, increase), "contract of hg_zonotope_widen()");
+    (void)lag;
+    (void)first;
+    write_zonotope(self);
+}
+
+void stub_hg_zonotope_step(hg_zonotope *self, const hg_ring *ring, hg_real *J)
+{
+    prove(requires_zonotope_step(self, ring, J), "contract of hg_zonotope_step()");
+    write_zonotope(self);
+    write_reals(J, self->config->residuals);
+}
+#endif
+
+/* ---- bank.h ---- */
+
+static void write_bank(hg_bank *self)
+{
+    self->k = any_u8();
+    self->closest = any_u8();
+    write_reals(self->sum, HG_BANK_SUMS(self->config->certificates));
+}
+
+void stub_hg_bank_reset(hg_bank *self)
+{
+    prove(requires_bank_reset(self), "contract of hg_bank_reset()");
+    const hg_bank before = *self;
+    write_bank(self);
+    assume(ensures_bank_reset(self, &before));
+}
+
+hg_status stub_hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *radius, hg_real *r, hg_real *J)
+{
+    prove(requires_bank_step(self, value, radius, r, J), "contract of hg_bank_step()");
+    const hg_bank before = *self;
+    const hg_status status = any_status();
+    write_bank(self);
+    write_reals(r, 1U);
+    write_reals(J, 1U);
+    assume(ensures_bank_step(self, &before, status));
+    return status;
+}
+
+#endif
