@@ -1,6 +1,6 @@
 # Fuzzing: each fuzz_NAME.c is one function that libFuzzer (clang-19) and AFL++ (clang-14) both drive, with AddressSanitizer and UBSan, against the numbered
 # invariants of INVARIANTS.md; readers.py does the same to the host's readers of files. corpus/ and regress/ are in hex. `make fuzz-quick` replays both
-# and fuzzes on for a few seconds, `make fuzz` for RUNTIME seconds a target and engine and adds what it did to ledger.toml.
+# and fuzzes on for a few seconds, `make fuzz` for RUNTIME seconds of the processor a target and engine and adds what it did to ledger.toml.
 
 FUZZ := $(BUILD)/fuzz
 RUNTIME := 1200
@@ -31,7 +31,7 @@ CHECK_PARTS += fuzz-quick
 fuzz-quick: lib $(call fuzz_programs,libfuzzer) ## fuzzing, short: corpus and regressions of all targets, 15 s each, some thousand cases a reader of files
 	@$(call fuzz_run,quick --seconds $(FUZZ_SECONDS) $(FUZZ_TARGETS))
 DEEP_PARTS += fuzz
-fuzz: lib $(call fuzz_programs,$(FUZZ_ENGINES)) ## fuzzing, long: RUNTIME seconds a target and engine, 10^5 cases a reader; adds to tests/fuzz/ledger.toml
+fuzz: lib $(call fuzz_programs,$(FUZZ_ENGINES)) ## fuzzing, long: RUNTIME processor seconds a target and engine, 10^5 cases a reader; adds to tests/fuzz/ledger.toml
 	@$(call fuzz_run,long --seconds $(RUNTIME) $(FUZZ_TARGETS))
 
 # Parts of the short form: one target, or the readers alone (READER).

@@ -1,7 +1,7 @@
 """Runs the fuzz targets and the readers' cases (fuzz.mk), and keeps corpus, regressions and the ledger of what was executed.
 
     fuzz.py quick  --seconds 15 TARGET ..     corpus and regressions of each target, then libFuzzer for so long; a few thousand cases a reader
-    fuzz.py long   --seconds 1200 TARGET ..   libFuzzer and AFL++ for so long each, 10^5 cases a reader in the ledger; adds to ledger.toml
+    fuzz.py long   --seconds 1200 TARGET ..   libFuzzer and AFL++ for so much processor time each, 10^5 cases a reader in the ledger; adds to ledger.toml
     fuzz.py pack TARGET ..                    a small corpus from what the long runs found: corpus/TARGET.hex
     fuzz.py keep TARGET FILE NAME             an input that broke an invariant becomes a regression: regress/TARGET.hex
 
@@ -9,8 +9,10 @@ Inputs are in hex, one a line behind its name, so that a difference can be read.
 """
 
 import argparse
+import fcntl
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -27,11 +29,16 @@ LONGEST = {"sound": 4096, "node": 2048, "tracker": 2048}  # bytes of an input th
 CORPUS_BYTES = 12000  # of a target's committed corpus
 READER_CASES_QUICK = 300
 READER_CASES_LONG = 100_000
+SLICE_S = 280  # of a long run: all targets in turn, so that one that is cut short has done something of each
+HEAD = """\
+# Executions so far of each fuzz target and reader, findings among them, and those still open. Seconds are of the processor, not of the clock: a
+# machine that does other things beside makes a run longer, not smaller. Written by tests/fuzz/fuzz.py.
+"""
 
 
 @dataclass
 class Entry:
-    """What was executed so far of one target by one engine: executions, seconds, findings and how many of them are still open."""
+    """What was executed so far of one target by one engine: executions, seconds of the processor, findings and how many of them are still open."""
 
     executions: int = 0
     seconds: int = 0
@@ -49,7 +56,7 @@ def read_ledger() -> dict[tuple[str, str], Entry]:
 
 def write_ledger(ledger: dict[tuple[str, str], Entry]) -> None:
     """Sorted, so that a difference shows what was added."""
-    lines = ["# Executions so far of each fuzz target and reader, findings among them, and those still open. Written by tests/fuzz/fuzz.py.\n"]
+    lines = [HEAD]
     for (target, engine), entry in sorted(ledger.items()):
         lines.append(
             f'[[run]]\ntarget = "{target}"\nengine = "{engine}"\nexecutions = {entry.executions}\nseconds = {entry.seconds}\nfindings = {entry.findings}\nopen = {entry.open}\n'
@@ -59,13 +66,21 @@ def write_ledger(ledger: dict[tuple[str, str], Entry]) -> None:
 
 def add_to_ledger(target: str, engine: str, executions: int, seconds: int, found: int) -> None:
     """One run's numbers; a finding is open until whoever mends it says so in the ledger."""
-    ledger = read_ledger()
-    entry = ledger.setdefault((target, engine), Entry())
-    entry.executions += executions
-    entry.seconds += seconds
-    entry.findings += found
-    entry.open += found
-    write_ledger(ledger)
+    with LEDGER.open() as held:  # readers and targets may run beside each other
+        fcntl.flock(held, fcntl.LOCK_EX)
+        ledger = read_ledger()
+        entry = ledger.setdefault((target, engine), Entry())
+        entry.executions += executions
+        entry.seconds += seconds
+        entry.findings += found
+        entry.open += found
+        write_ledger(ledger)
+
+
+def children_s() -> float:
+    """Processor seconds of all child processes that have ended, their children included."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def read_hex(path: Path) -> dict[str, bytes]:
@@ -218,21 +233,34 @@ def write_results(build: Path, targets: list[str]) -> None:
     write_to(build.parent / "results" / "fuzz-quick.json", promises)
 
 
-def long(build: Path, targets: list[str], seconds: int, engines: list[str]) -> int:
-    """Both engines, one after the other; then the readers' cases that the ledger does not have yet."""
+def sliced(target: str, engine: str, build: Path, seconds: float) -> tuple[float, bool]:
+    """A slice of a long run, which ends by the clock because both engines do; its numbers go to the ledger. Processor seconds used, and whether all is well."""
+    began = children_s()
     seed = sum(entry.executions for entry in read_ledger().values()) % 2**31  # another one each time
+    limit = max(1, round(min(seconds, SLICE_S)))
+    executed, found, log = lib_fuzzer(target, build, limit, seed, True) if engine == "libfuzzer" else afl(target, build, limit)
+    used = children_s() - began
+    add_to_ledger(target, engine, executed, round(used), len(found))
+    print(f"  {target} {engine}: {executed} executions in {used:.0f} s, {len(found)} findings", flush=True)
+    if found:
+        print(f"FAILED {fail(target, engine, log, found)}", flush=True)
+    return used, not found
+
+
+def long(build: Path, targets: list[str], seconds: int, engines: list[str]) -> int:
+    """Each engine, slice by slice, until every target has had its processor time or a finding; then the readers' cases that the ledger does not have yet."""
     failed = False
-    for target in targets:
-        for engine in engines:
-            if engine == "readers":
-                continue
-            executed, found, log = lib_fuzzer(target, build, seconds, seed, True) if engine == "libfuzzer" else afl(target, build, seconds)
-            add_to_ledger(target, engine, executed, seconds, len(found))
-            print(f"  {target} {engine}: {executed} executions, {len(found)} findings", flush=True)
-            if found:
-                failed = True
-                print(f"FAILED {fail(target, engine, log, found)}", flush=True)
+    for engine in engines:
+        left = dict.fromkeys(targets if engine != "readers" else (), float(seconds))
+        while left:
+            for target in list(left):
+                used, well = sliced(target, engine, build, left[target])
+                left[target] -= used
+                failed = failed or not well
+                if not well or left[target] < 1:
+                    del left[target]
     if "readers" in engines:
+        seed = sum(entry.executions for entry in read_ledger().values()) % 2**31
         beside = readers(build, ["--ledger", "--cases", str(READER_CASES_LONG), "--seed", str(seed)])
         for line in beside.stdout or []:
             print(line, end="", flush=True)
