@@ -55,7 +55,7 @@ UNIT_DATA   := $(wildcard tests/fixtures/*)
 RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig_*.c))
 
 OBJECTS :=
-TEST_PARTS := lib
+TEST_PARTS := lib apps pytest-host# the longest one first
 CHECK_PARTS := lib
 DEEP_PARTS := lib
 

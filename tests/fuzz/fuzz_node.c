@@ -65,12 +65,18 @@ static void begin(source *s, rig *r)
     }
 }
 
+/* Numbers of a detector's memory that last: behind a polynomial filter's is what each of its steps computes anew, and there squares may overflow. */
+static uint32_t lasting(const hg_detector *d)
+{
+    return (d->config->polynomials > 0U) ? (uint32_t)(d->memory.polynomial[0].filter.eta - d->memory.real) : d->memory.reals;
+}
+
 /* I7: nothing that is not finite, no radius below 0 or beyond its span. */
 static void check_state(const rig *r)
 {
     const hg_detector *d = &r->node->detector;
     const hg_detector_config *config = d->config;
-    require(7U, all_finite(d->memory.real, d->memory.reals));
+    require(7U, all_finite(d->memory.real, lasting(d)));
     require(7U, all_finite(d->value, config->width) && all_finite(d->radius, config->width) && all_finite(d->r, config->residuals));
     require(7U, all_finite(d->J, config->residuals));
     for (uint8_t i = 0U; i < config->width; i++) {

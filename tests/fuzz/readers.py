@@ -7,32 +7,39 @@ InputError of one line may come of it, never another exception, a hang of more t
     readers.py --work DIR --reader model --seed 1 --only 77    one case again, with its traceback
     readers.py --work DIR --ledger --cases 100000         up to so many cases a reader in ledger.toml, which it adds to
 
-A case depends on reader, seed and number alone. regress/readers.txt holds the inputs of findings, in hex.
+A case depends on reader, seed and number alone. regress/readers.txt holds the inputs of findings, in hex. Most cases are made of the small files in
+seeds/, which have one of everything: what a case costs is what the file it is made of costs to read, and the shipped ones cost ten times as much.
 """
 
 from __future__ import annotations
 
 import argparse
+import copy
+import gc
 import io
 import json
 import random
 import resource
 import signal
 import sys
+import tempfile
 import time
 import tomllib
 import traceback
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import numpy as np
+import scipy.io
 import tomli_w
+from apart import Hang, Lasting
 
 from hullguard.bus import candump, formats
 from hullguard.bus.candump import Entry
@@ -49,15 +56,20 @@ from hullguard.model.expression import compiled
 from hullguard.model.fusion import KIND, kind_of, load_fusion
 from hullguard.model.schema import SHIPPED
 from hullguard.monitor.state import Monitor
+from hullguard.new import sources
 from hullguard.new.sources import read_file, read_inline
 from hullguard.plant.recording import read_recording
 from hullguard.report.run_data import read_run
 
 ROOT = Path(__file__).parents[2]
 REGRESSIONS = Path(__file__).parent / "regress" / "readers.txt"
+SEEDS = Path(__file__).parent / "seeds"
+MEMORY = Path("/dev/shm")  # files of cases are never on a disk where the system has such a folder
 LIMIT_S = 10
 LIMIT_BYTES = 6 << 30
-QUICK_S = 4.0  # of a reader in the short form
+QUICK_S = 2.0  # of a reader in the short form
+CHUNK_S = 30.0  # after so much the ledger has what was done
+LEDGER_SEED = 0
 NUMBERS = (
     "0",
     "-0",
@@ -284,7 +296,7 @@ class Draw(random.Random):
         elif how == 4 and isinstance(place[key], str):
             place[key] = self.text(place[key], most=1)
         else:
-            place[key] = self.choice(LEAVES)
+            place[key] = copy.deepcopy(self.choice(LEAVES))  # what is put in may be changed in turn, and a case depends on its own number alone
 
 
 @dataclass(frozen=True)
@@ -305,6 +317,17 @@ def shipped(design_files: bool, kind: str = "") -> tuple[tuple[str, str], ...]:
     return tuple((p.name, p.read_text(encoding="utf-8")) for p in found if design_files or (kind_of(str(p)) == KIND) == (kind == KIND))
 
 
+@cache
+def small(name: str) -> str:
+    """One of the files of seeds/."""
+    return (SEEDS / name).read_text(encoding="utf-8")
+
+
+def _lighter(draw: Draw, texts: list[str]) -> str:
+    """One of the texts, the long ones seldom: what it costs to read grows with the length."""
+    return draw.choices(texts, [1.0 / len(text) for text in texts])[0]
+
+
 def _toml(draw: Draw, text: str) -> bytes:
     if draw.random() < 0.5:
         return draw.text(text).encode("utf-8", "replace")
@@ -322,7 +345,14 @@ def _file(data: bytes, work: Path, name: str) -> Path:
 
 def make_model(draw: Draw) -> bytes:
     """A detector's model."""
-    return _toml(draw, draw.choice([text for _, text in shipped(False)]))
+    return _toml(draw, small("small.toml") if draw.random() < 0.7 else draw.choices(*plants())[0])
+
+
+@cache
+def plants() -> tuple[list[str], list[float]]:
+    """The shipped detectors' models and their shares: those with expressions, which are expanded in symbols, cost ten times as much as the others."""
+    texts = [text for _, text in shipped(False)]
+    return texts, [0.1 if "polynomial" in text or "quadratic" in text else 1.0 for text in texts]
 
 
 def make_fusion(draw: Draw) -> bytes:
@@ -332,12 +362,19 @@ def make_fusion(draw: Draw) -> bytes:
 
 def make_design(draw: Draw) -> bytes:
     """A design file; the banks' long tables are rarely interesting."""
-    return _toml(draw, draw.choice([text for _, text in shipped(True) if len(text) < 60_000]))
+    return _toml(draw, _lighter(draw, [text for _, text in shipped(True) if len(text) < 60_000]))
 
 
 def make_override(draw: Draw) -> bytes:
-    """A --set option of the platoon."""
+    """A --set option of the small model or the platoon."""
     keys = (
+        "groups.sensor.trigger.delta",
+        "groups.sensor.frame",
+        "signals.way_m.slew",
+        "plant.A",
+        "plant.feedback",
+        "detector.isolation.sizes",
+        "detector",
         "groups.measurement.trigger.silence",
         "plant.vehicles",
         "groups.0.name",
@@ -357,7 +394,7 @@ def make_override(draw: Draw) -> bytes:
 def read_override(data: bytes, _: Path) -> object:
     """As the command takes it."""
     key, value = parse_override(data.decode("utf-8", "replace"))
-    return load_model("platoon", {key: value})
+    return load_model("platoon" if zlib.crc32(data) % 8 == 0 else str(SEEDS / "small.toml"), {key: value})
 
 
 EXPRESSIONS = ("-k * (x1 - l)**3 / m + sin(x2) * exp(-x1)", "x1 + 2.5e-3*x2", "sqrt(x1**2 + x2**2) / (1 + tanh(x1))", "((((x1))))", "-x1**-x2", "a*x1 - log(x2)")
@@ -418,13 +455,20 @@ def make_entries(draw: Draw) -> list[Entry]:
     return made
 
 
+WHOLE = 300  # recordings of each format, which are then spoilt over and over
+
+
 def of_format(suffix: str) -> Reader:
     """A recording of frames by its suffix: written whole, then spoilt."""
 
-    def make(draw: Draw) -> bytes:
+    @cache
+    def whole_one(number: int) -> bytes:
         path = Path(scratch()) / f"whole{suffix}"
-        formats.write(path, make_entries(draw))
-        whole = path.read_bytes()
+        formats.write(path, make_entries(Draw(f"whole{suffix}:{number}")))
+        return path.read_bytes()
+
+    def make(draw: Draw) -> bytes:
+        whole = whole_one(draw.randrange(WHOLE))
         if suffix in (".log", ".asc"):
             return draw.text(whole.decode("ascii")).encode("utf-8", "replace")
         return draw.bytes_(whole)
@@ -450,15 +494,17 @@ NETWORK = ROOT / "tests" / "fixtures" / "network"
 
 @cache
 def databases() -> tuple[str, ...]:
-    """A vehicle's own, and two that the design emits."""
-    return tuple(p.read_text(encoding="cp1252") for p in (NETWORK / "vehicle.dbc", ROOT / "firmware" / "models" / "platoon.dbc", ROOT / "firmware" / "models" / "fusion5.dbc"))
+    """A small one with one of everything, a vehicle's own, and two that the design emits."""
+    emitted = ROOT / "firmware" / "models"
+    return tuple(p.read_text(encoding="cp1252") for p in (SEEDS / "small.dbc", NETWORK / "vehicle.dbc", emitted / "platoon.dbc", emitted / "fusion5.dbc"))
 
 
 def make_dbc(draw: Draw) -> bytes:
     """A database."""
-    return draw.text(draw.choice(databases()), ("SG_", "BO_", "m0", "M", "@1+", "@0-", "(0,0)", "[0|0]", "BA_", "64", "-1", '"', "SIG_VALTYPE_", *WORDS)).encode(
-        "cp1252", "replace"
-    )
+    text = draw.choices(databases(), (40, 4, 1, 1))[0]
+    if draw.random() < 0.5:  # without some of its messages
+        text = "\n\n".join(part for part in text.split("\n\n") if not part.startswith("BO_ ") or draw.random() < 0.5)
+    return draw.text(text, ("SG_", "BO_", "m0", "M", "@1+", "@0-", "(0,0)", "[0|0]", "BA_", "64", "-1", '"', "SIG_VALTYPE_", *WORDS)).encode("cp1252", "replace")
 
 
 def read_dbc(data: bytes, work: Path) -> object:
@@ -467,14 +513,15 @@ def read_dbc(data: bytes, work: Path) -> object:
 
 
 def make_network(draw: Draw) -> bytes:
-    """The vehicle's database, for a model that takes its frames from it; now and then the model is what is wrong."""
-    return draw.text(databases()[0]).encode("cp1252", "replace")
+    """The database of a model that takes its frames from it: the small one's or the vehicle's."""
+    return draw.text(databases()[1 if draw.random() < 0.1 else 0]).encode("cp1252", "replace")
 
 
 def read_network(data: bytes, work: Path) -> object:
     """As a model takes it."""
     _file(data, work, "vehicle.dbc")
-    (work / "network.toml").write_text((NETWORK / "network.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    folder = NETWORK if b"Actuators" in data else SEEDS
+    (work / "network.toml").write_text((folder / "network.toml").read_text(encoding="utf-8"), encoding="utf-8")
     return load_model(str(work / "network.toml"))
 
 
@@ -484,8 +531,6 @@ MATRICES = {"A": [[0.9, 0.1], [0.0, 0.8]], "B": [[0.0], [1.0]], "C": [[1.0, 0.0]
 
 
 def _mat(draw: Draw) -> bytes:
-    import scipy.io  # type: ignore[import-untyped]
-
     out = io.BytesIO()
     held: dict[str, Any] = {k: np.array(v) for k, v in MATRICES.items()} | {"Ts": 0.1}
     scipy.io.savemat(out, held if draw.random() < 0.5 else {"system": held}, do_compression=draw.random() < 0.3)
@@ -540,10 +585,17 @@ def make_directive(draw: Draw) -> bytes:
     return draw.text(draw.choice(DIRECTIVES)).encode("utf-8", "replace")
 
 
+@cache
+def examples() -> tuple[str, ...]:
+    """The entries of the shipped examples."""
+    texts = [p.read_text(encoding="utf-8").partition("directives:\n")[2] for p in sorted((ROOT / "host_tools" / "examples").glob("*.yaml"))]
+    return tuple(f"  - {entry}" for text in texts for entry in text.removeprefix("  - ").split("\n  - "))
+
+
 def make_directives(draw: Draw) -> bytes:
-    """A YAML file: the shipped examples, and nested ones."""
-    text = draw.choice([p.read_text(encoding="utf-8") for p in sorted((ROOT / "host_tools" / "examples").glob("*.yaml"))])
-    if draw.random() < 0.03:
+    """A YAML file: some of the shipped examples' entries, and now and then nested ones."""
+    text = "directives:\n" + "".join(draw.sample(examples(), draw.randrange(1, 4)))
+    if draw.random() < 0.003:
         n = draw.choice((30, 200, 5000))
         text = draw.choice(
             ("[" * n, "{a: " * n, "- " * n + "x", "&a [*a]", "a: &a [x, x]\n" + "\n".join(f"{chr(98 + i)}: &{chr(98 + i)} [*{chr(97 + i)}, *{chr(97 + i)}]" for i in range(20)))
@@ -572,6 +624,7 @@ def read_predicate(data: bytes, _: Path) -> object:
 def designed() -> tuple[Design, Native]:
     """What the monitor watches with."""
     made = design(load_model("platoon"))[0]
+    made = replace(made, tables=replace(made.tables, float_hash=made.tables.hash))  # every monitor asks for it, and it costs as much as all the frames of a case
     return made, Native(library("f32"), made.tables)
 
 
@@ -620,11 +673,17 @@ def make_run(draw: Draw) -> bytes:
 
 def read_run_(data: bytes, work: Path) -> object:
     """As report reads the folder."""
-    folder = work / "run"
-    folder.mkdir(exist_ok=True)
-    for number, (name, whole) in enumerate(finished().items()):
-        (folder / name).write_bytes(data[1:] if number == data[0] else whole)
-    return read_run(folder)
+    folder = work / "run_read"
+    if not folder.exists():
+        folder.mkdir()
+        for name, whole in finished().items():
+            (folder / name).write_bytes(whole)
+    name, whole = list(finished().items())[data[0]]
+    (folder / name).write_bytes(data[1:])
+    try:
+        return read_run(folder)
+    finally:
+        (folder / name).write_bytes(whole)
 
 
 READERS: dict[str, Reader] = {
@@ -652,10 +711,6 @@ READERS: dict[str, Reader] = {
 
 
 # ---- running ----
-
-
-class Hang(BaseException):
-    """A case took longer than LIMIT_S; no Exception, which a reader might take for a damaged file."""
 
 
 @contextmanager
@@ -706,20 +761,21 @@ def regressions(work: Path) -> list[str]:
     return found
 
 
-def several(name: str, seed: int, cases: int, seconds: float, work: Path) -> tuple[int, list[str]]:
-    """Cases of one reader; how many were made in the time, and findings that differ by their last line."""
+def several(name: str, seed: int, numbers: range, seconds: float, folders: tuple[Path, Path]) -> tuple[int, list[str]]:
+    """Cases of one reader, worked on in the first folder; how many were made in the processor's time, and findings that differ by their last line, kept in the second."""
+    work, kept = folders
     found: dict[str, str] = {}
-    end = time.monotonic() + seconds
-    made = 0
-    while made < cases and time.monotonic() < end:
-        data, told = one(name, seed, made, work)
+    end = time.process_time() + seconds
+    for made, number in enumerate(numbers):
+        if time.process_time() >= end:
+            return made, list(found.values())
+        data, told = one(name, seed, number, work)
         if told:
             key = "".join(told.strip().splitlines()[-3:-1])
             if key not in found:
-                (work / f"{name}-{seed}-{made}").write_bytes(data)
-                found[key] = f"{name}, --seed {seed} --only {made}: {told}"
-        made += 1
-    return made, list(found.values())
+                (kept / f"{name}-{seed}-{number}").write_bytes(data)
+                found[key] = f"{name}, --seed {seed} --only {number}: {told}"
+    return len(numbers), list(found.values())
 
 
 def main() -> int:
@@ -728,45 +784,70 @@ def main() -> int:
     parser.add_argument("--work", type=Path, required=True)
     parser.add_argument("--cases", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=0.0, help="most of a reader; default: 4 in the short form, no limit in the long one")
     parser.add_argument("--reader", action="append", choices=sorted(READERS))
     parser.add_argument("--only", type=int)
     parser.add_argument("--ledger", action="store_true")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
-    _SCRATCH.append(options.work)
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_AS, (LIMIT_BYTES, LIMIT_BYTES))
     names = options.reader or list(READERS)
-    if options.only is not None:
-        data, told = one(names[0], options.seed, options.only, options.work)
-        print(f"{data!r}\n{told or 'refused or read as it should be'}")
-        return 1 if told else 0
-    return run(names, options)
+    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as made:
+        folders = (Path(made), options.work)
+        _SCRATCH.append(folders[0])
+        if options.only is not None:
+            data, told = one(names[0], options.seed, options.only, folders[0])
+            print(f"{data!r}\n{told or 'refused or read as it should be'}")
+            return 1 if told else 0
+        found = say(regressions(folders[0]))
+        gc.freeze()  # what the libraries hold is not looked through again and again
+        apart = Lasting(LIMIT_S)
+        sources.ProcessPoolExecutor = apart  # type: ignore[assignment, attr-defined]
+        found += long(names, options.cases, folders, apart) if options.ledger else short(names, options, folders)
+        apart.end()
+    return 1 if found else 0
 
 
-def run(names: list[str], options: argparse.Namespace) -> int:
-    """All readers; what was wrong is printed."""
-    from fuzz import add_to_ledger, read_ledger
+def say(found: list[str]) -> list[str]:
+    """What was wrong, at once."""
+    for told in found:
+        print(f"FAILED {told}", flush=True)
+    return found
 
-    found = regressions(options.work)
+
+def short(names: list[str], options: argparse.Namespace, folders: tuple[Path, Path]) -> list[str]:
+    """Cases of all readers; what was wrong."""
+    found: list[str] = []
     total = 0
     for name in names:
-        entry = read_ledger().get((name, "readers")) if options.ledger else None
-        wanted = max(0, options.cases - (entry.executions if entry is not None else 0))
-        began = time.monotonic()
-        limit = options.seconds or (1e9 if options.ledger else QUICK_S)
-        made, wrong_ones = several(name, options.seed, wanted, limit, options.work)
+        made, more = several(name, options.seed, range(options.cases), QUICK_S, folders)
         total += made
-        found += wrong_ones
-        if options.ledger and made:
-            add_to_ledger(name, "readers", made, round(time.monotonic() - began), len(wrong_ones))
-            print(f"  {name}: {made} cases, {len(wrong_ones)} findings", flush=True)
-    for told in found:
-        print(f"FAILED {told}")
+        found += say(more)
     if not found:
         print(f"  ok  readers: {total} wrong inputs of {len(names)} kinds, each read or refused in one line")
-    return 1 if found else 0
+    return found
+
+
+def long(names: list[str], cases: int, folders: tuple[Path, Path], apart: Lasting) -> list[str]:
+    """The cases that the ledger does not have yet, all of one seed: its numbers go on where the ledger ends. A chunk of each reader in turn."""
+    from fuzz import add_to_ledger, children_s, read_ledger
+
+    found: list[str] = []
+    left = list(names)
+    while left:
+        for name in list(left):
+            entry = read_ledger().get((name, "readers"))
+            done = entry.executions if entry is not None else 0
+            began = time.process_time() + children_s()
+            made, more = several(name, LEDGER_SEED, range(done, max(done, cases)), CHUNK_S, folders)
+            apart.end()  # its time counts once it has ended
+            if made:
+                add_to_ledger(name, "readers", made, round(time.process_time() + children_s() - began), len(more))
+                print(f"  {name}: {made} cases, {len(more)} findings", flush=True)
+            found += say(more)
+            if done + made >= cases:
+                left.remove(name)
+    return found
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from hullguard.bus.link import from_message, to_message
 from hullguard.errors import InputError
 from hullguard.files import is_file
 
+BLF_HEADER = struct.Struct("<4sHHLL")  # of an object: signature, length and version of the header, length of the object with it, kind
 FIRST_DATE_S = 631152000.0  # 1990: BLF and ASC keep the date of their first frame, and take an earlier one for none
 
 
@@ -71,8 +72,21 @@ def numbers(entries: Iterable[Entry]) -> dict[str, int]:
     return found
 
 
+class _BlfReader(can.BLFReader):
+    """python-can's goes to the next object by the length that the file says: by none it would read the same one for ever."""
+
+    def _parse_data(self, data: bytes) -> Iterator[can.Message]:
+        at = data.find(b"LOBJ", 0, 8)
+        while 0 <= at <= len(data) - BLF_HEADER.size:
+            size = BLF_HEADER.unpack_from(data, at)[3]
+            if size < BLF_HEADER.size:
+                raise ValueError(f"an object of {size} bytes")
+            at = data.find(b"LOBJ", at + size, at + size + 8)
+        yield from super()._parse_data(data)
+
+
 def _read_blf(path: Path) -> Iterator[Entry]:
-    with can.BLFReader(path) as reader:
+    with _BlfReader(path) as reader:
         yield from map(from_numbered, reader)
 
 

@@ -23,7 +23,7 @@ from hullguard.core.protect import Protector
 from hullguard.design.design import Design
 from hullguard.design.protection import NONE, check_protection
 from hullguard.errors import InputError
-from hullguard.model.network import protection, too_large
+from hullguard.model.network import protection, real, too_large
 
 FLOATS = {16: ("<e", 0x7E00), 32: ("<f", 0x7FC00000), 64: ("<d", 0x7FF8000000000000)}  # bits: format, quiet NaN
 KIND = EXTENDED | REMOTE | FD | ERROR
@@ -251,11 +251,12 @@ def _protection(message: Any) -> Protector | None:
 def _fields(message: Any) -> dict[str, Field]:
     made: dict[str, Field] = {}
     for s in sorted(message.signals, key=lambda s: s.multiplexer_signal is not None):
+        where = f"message '{message.name}', signal '{s.name}'"
         choice = (made[s.multiplexer_signal], tuple(s.multiplexer_ids)) if s.multiplexer_signal in made and s.multiplexer_ids else None
         made[s.name] = Field(
             name=s.name, start=s.start, length=s.length, motorola=s.byte_order == "big_endian", is_signed=bool(s.is_signed) and not s.is_float, is_float=bool(s.is_float),
-            scale=float(s.scale), offset=float(s.offset), minimum=None if s.minimum is None else float(s.minimum),
-            maximum=None if s.maximum is None else float(s.maximum), choice=choice,
+            scale=real(s.scale, where), offset=real(s.offset, where), minimum=None if s.minimum is None else real(s.minimum, where),
+            maximum=None if s.maximum is None else real(s.maximum, where), choice=choice,
         )  # fmt: skip
     return made
 

@@ -234,15 +234,17 @@ def _read_plant(t: Table, period: float) -> FusionPlant:
         raise t.error("Q", "a covariance is symmetric and not negative")
     wide = t.vector("P0", n, 1e-12)
     origin = np.zeros(n)
-    for name, step in (t.table("origin", optional=True).data if "origin" in t else {}).items():
+    steps = t.table("origin", optional=True)
+    for name in steps.data:
         if name not in states:
             raise t.error("origin", f"'{name}' is not one of {', '.join(states)}")
         j = states.index(name)
-        if not isinstance(step, (int, float)) or step <= 0:
+        step = steps.number(name)
+        if step <= 0:
             raise t.error("origin", f"the step of {name} must be a number above 0")
         if not np.array_equal(A[:, j], np.eye(n)[j]):
             raise t.error("origin", f"{name} moves other states by its size, so its origin cannot be shifted; only where column {j + 1} of A is that of the unit matrix")
-        origin[j] = float(step)
+        origin[j] = step
     plant = FusionPlant(builder, states, A, Q, t.vector("x0", n), np.diag(wide), tuple(float(x) for x in origin))
     t.close()
     return plant

@@ -7,6 +7,7 @@ what the model leaves out. All that the library could not do, or could not do so
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -123,6 +124,14 @@ def too_large(text: str) -> str:
     return ""
 
 
+def real(value: Any, where: str) -> float:
+    """A number of a database as a float: it may have more digits than one holds."""
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise InputError(f"{where}: {str(value)[:12]}.. is too large a number; correct the database") from error
+
+
 def load(network: Table, folder: Path) -> Any:
     """The database that [network] names, a path relative to the model file."""
     import cantools
@@ -214,6 +223,7 @@ def _field(where: str, at: str, message: Any, entry: dict[str, Any]) -> Field:
     signal = _found(asked, message.signals)
     if signal is None:
         raise InputError(f"{where} has no signal '{asked}'{_nearest(asked, [s.name for s in message.signals])}")
+    here = f"{where}, signal '{signal.name}'"
     made = Field(
         name=signal.name,
         start=signal.start,
@@ -221,13 +231,13 @@ def _field(where: str, at: str, message: Any, entry: dict[str, Any]) -> Field:
         motorola=signal.byte_order == "big_endian",
         is_signed=bool(signal.is_signed),
         is_float=bool(signal.is_float),
-        factor=float(signal.scale),
-        offset=float(signal.offset),
-        low=None if signal.minimum is None else float(signal.minimum),
-        high=None if signal.maximum is None else float(signal.maximum),
+        factor=real(signal.scale, here),
+        offset=real(signal.offset, here),
+        low=None if signal.minimum is None else real(signal.minimum, here),
+        high=None if signal.maximum is None else real(signal.maximum, here),
     )
-    _readable(f"{where}, signal '{made.name}'", made)
-    _filled(f"{where}, signal '{made.name}'", made, entry)
+    _readable(here, made)
+    _filled(here, made, entry)
     return made
 
 
@@ -273,9 +283,9 @@ def check_range(wire: Wire, field: Field, s: Signal) -> None:
         return
     where = f"signal '{s.name}': range {s.low:g} .. {s.high:g}"
     least, largest = field.codes
-    codes = round((s.low - field.offset) / field.factor), round((s.high - field.offset) / field.factor)
+    codes = (s.low - field.offset) / field.factor, (s.high - field.offset) / field.factor  # infinite where the factor is tiny
     bounds = f"{field.offset + least * field.factor:g} .. {field.offset + largest * field.factor:g}"
-    if codes[0] < least or codes[1] > largest:
+    if not all(map(math.isfinite, codes)) or round(codes[0]) < least or round(codes[1]) > largest:
         raise InputError(
             f"{where} does not fit '{field.name}' of message '{wire.message}', which carries {bounds} beside the raw value that says 'no value', "
             f"{least - 1 if field.is_signed else largest + 1}; give a range within"

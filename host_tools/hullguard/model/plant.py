@@ -126,8 +126,11 @@ def read_plant(table: Table, outputs: list[str], inputs: list[str], noise: dict[
         if len(states) != n:
             raise table.error("states", f"expected {n} names, found {len(states)}")
         hold_s = None if table.flag("discrete", False) else sample_time_s
-    A, B = (made.A, made.B) if hold_s is None else zero_order_hold(made.A, made.B, hold_s)
-    dA, dB = (made.A_pm, made.B_pm) if hold_s is None else enclosure(made, hold_s)
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused below
+        A, B = (made.A, made.B) if hold_s is None else zero_order_hold(made.A, made.B, hold_s)
+        dA, dB = (made.A_pm, made.B_pm) if hold_s is None else enclosure(made, hold_s)
+    if not all(np.isfinite(x).all() for x in (A, B, dA, dB)):
+        raise InputError(f"{table.where}: within a sample the plant grows beyond all numbers; check its matrices and sample_time_s")
     n = A.shape[0]
     Ed, Fd = _disturbance(table, B, D, outputs, inputs, noise)
     unknown = read_unknown(table, builder, made.A, made.B)
