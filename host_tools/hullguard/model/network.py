@@ -28,6 +28,7 @@ LENGTH_MAX = 1785  # bytes: of a message that a transport protocol (J1939) carri
 _PLACE = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(-?\d+)|:\s*(-?\d+)\s*\|\s*(-?\d+)\s*@")
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 CLASSIC_MAX = 8
+CYCLE_MAX_MS = 3_600_000  # an hour
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,14 @@ def real(value: Any, where: str) -> float:
         raise InputError(f"{where}: {str(value)[:12]}.. is too large a number; correct the database") from error
 
 
+def _cycle_ms(message: Any) -> int:
+    """The period of a message, 0 where the database states none."""
+    cycle = message.cycle_time or 0
+    if not 0 <= cycle <= CYCLE_MAX_MS:
+        raise InputError(f"message '{message.name}': its cycle time of {str(cycle)[:12]} ms is outside 0 .. {CYCLE_MAX_MS}; correct the database")
+    return int(cycle)
+
+
 def load(network: Table, folder: Path) -> Any:
     """The database that [network] names, a path relative to the model file."""
     import cantools
@@ -201,7 +210,7 @@ def _wire(t: Table, database: Any, signals: list[tuple[str, dict[str, Any]]]) ->
         fields=fields,
         protection=protection_,
         idle=_idle(message, {f.name for f in fields}),
-        cycle_ms=int(message.cycle_time or 0),
+        cycle_ms=_cycle_ms(message),
     )
 
 

@@ -366,7 +366,10 @@ def parse_override(text: str) -> tuple[str, Any]:
 
 def parse_model(source: dict[str, Any], path: Path) -> Model:
     """Check a model's data and make a Model of it."""
-    data = expand(source, path.name)
+    try:
+        data = expand(source, path.name)
+    except RecursionError as error:
+        raise InputError(f"{path.name}: arrays and tables are nested too deeply; take some of the brackets away") from error
     network = adopt(data, path.name, path.parent)
     top = Table(data, path.name)
     if top.whole("schema", 1, 10_000) != SCHEMA:

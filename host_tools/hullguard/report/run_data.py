@@ -19,6 +19,7 @@ from hullguard.model.table import Array
 
 PLANT = ("starting", "none", "provisional", "confirmed")
 BUS = ("good", "absent", "lossy", "stale")  # in the order in which they matter
+RESIDUALS_MAX = 255  # of one judge
 
 
 @dataclass(frozen=True)
@@ -269,7 +270,7 @@ def _groups(top: _Json, column: dict[str, Array], where: Path) -> tuple[GroupRun
         g = per_group.object(name)
         try:
             histogram = {int(k): int(v) for k, v in sorted(g.object("histogram").data.items(), key=lambda kv: int(kv[0]))}
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{g.where}: 'histogram' is not a count of each interval") from error
         groups.append(
             GroupRun(
@@ -298,8 +299,8 @@ def _judges(top: _Json) -> tuple[Judge, ...]:
         kind, count = j.text("kind"), j.number("residuals")
         if kind not in KINDS:
             raise InputError(f"{j.where}: kind '{kind}' is not one of {', '.join(KINDS)}")
-        if count < 1:
-            raise InputError(f"{j.where}: 'residuals' is {count:g}, expected at least 1")
+        if not 1 <= count <= RESIDUALS_MAX:
+            raise InputError(f"{j.where}: 'residuals' is {count:g}, expected 1 to {RESIDUALS_MAX}")
         made.append(Judge(j.text("name"), kind, round(count)))
     if not made:
         raise InputError(f"{top.where}: 'judges' is empty: no residual to show; run hullguard again to write it anew")
