@@ -6,7 +6,7 @@
 
 /** Sealed memory is good as long as it is as it was, and any number of wrong bits within 31 in a row is found.
  *  Any memory of any length up to BYTES, the wrong bits anywhere in it.
- *  @proves hg_guard_seal hg_guard_check
+ *  @proves hg_guard_seal hg_guard_check hg_guard_sum
  *  @run check real=f32 unwind=15 limit=60 BYTES=13U */
 void proof_guard(void)
 {
@@ -19,7 +19,7 @@ void proof_guard(void)
     const hg_status sealed = hg_guard_seal(&self, at, bytes);
     prove(sealed == ((bytes > 0U) ? HG_OK : HG_E_ARGUMENT), "not without memory");
     if (sealed == HG_OK) {
-        prove(hg_guard_check(&self, at, bytes) == HG_OK, "as it was");
+        prove((hg_guard_check(&self, at, bytes) == HG_OK) && (hg_guard_sum(at, bytes) == self.sum), "as it was");
         const uint64_t wrong = ((uint64_t)(any_u32() >> 1U) | 1U) << any_u8_in(0U, 7U); /* 31 bits, the first of them in the first byte */
         const uint8_t from = any_u8_in(0U, (uint8_t)(bytes - 1U));
         for (uint8_t i = 0U; (i < 5U) && ((from + i) < bytes); i++) {
