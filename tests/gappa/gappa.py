@@ -8,6 +8,12 @@
 - codec: |what the receiver's value is - the plant's value| <= half of hold.h, from reading the value through hg_code_encode() to hg_code_value(), for every
   signal of the shipped models that is sent as an integer; and |value of a code - offset - resolution code| <= half where the plant takes what was sent.
 - q31: hg_q31_shift() and with it hg_acc_real() lose half a step at most, by every number of places that a sum is shifted.
+- sum: n numbers above 0, products and sums in the order of the C code, lose at most the share n u of their exact sum, u = 2^-24: by induction, a script for each step
+  up to the longest sum of a shipped table. Underflow aside, which takes less than 2^-149 from a product.
+- gamma: n factors 1 + d, |d| <= u, are 1 within gamma32(n): what that makes of a sum with signs follows by its linearity. For each length of a shipped certificate.
+- widened: what hull, modes, bank, mismatch and zonotope widen their tables by is at least what the C code can lose of any number on its way into threshold or radius,
+  for each size that a shipped table has, and for the largest sizes of a zonotope and of a mismatch with as many groups as there can be; likewise what a decay is made
+  slower by, in one step of its theta.
 """
 
 import math
@@ -21,7 +27,8 @@ from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 
-from hullguard.design.arith import gamma32
+from hullguard.design import bank_table, hull, mismatch, uio_hull, zonotope
+from hullguard.design.arith import gamma32, share32
 from hullguard.design.tables import FLOAT32, SignalTable, signal_table
 from hullguard.model import load_model
 from hullguard.model.schema import Signal
@@ -32,6 +39,17 @@ from result import write_to
 ROOT = Path(__file__).resolve().parent.parent.parent
 MODELS = ("platoon", "platoon_bank", "suspension", "suspension_published", "two_state", "quadratic_sensor", "battery_cell", "cubic_suspension")
 SHAPE = re.compile(r"\.order = (\d+)U, \.residuals = \d+U, \.width = (\d+)U")
+TAPS = re.compile(r"static const uint8_t (\w+_taps)\[\] = \{([^}]*)\}")
+HULL = re.compile(r"\.residuals = \d+U, \.width = (\d+)U, \.exponent[^{}]*?\.taps = (\w+)[^{}]*")
+MODES = re.compile(r"\.modes = (\d+)U")
+BANK = re.compile(r"\.window = (\d+)U, \.width = (\d+)U[^{}]*?\.extras = (\d+)U[^{}]*\.widen = HG_REAL_T\((\S+),")
+MISMATCH = re.compile(r"hg_mismatch_config \w+ = \{\.states = \d+U, \.width = (\d+)U")
+GROUPS = re.compile(r"#define HG_\w+_GROUPS (\d+)U")
+GROUPS_MAX = 8  # HG_GROUPS_MAX
+LARGEST = 255  # order, width, columns, disturbances of a zonotope; signals of a mismatch
+U = Fraction(1, 2**24)
+DIGITS = Fraction(5, 10**7)  # what rounding to seven digits can take from a decay
+DOUBLE = Fraction(1, 2**50)  # what the design's own products lose
 GRID = 200  # bits behind the point of the bounds in a script, rounded to the safe side
 CPU_S = 10  # of one script; what holds is proved in 0.5, what does not is searched for ever
 FLOAT = "@rnd = float<ieee_32, ne>;"
@@ -87,12 +105,88 @@ def shifts() -> Iterator[tuple[str, str]]:
         yield f"q31 shift by {places}", text
 
 
+def growing(n: int) -> str:
+    """One number more: a sum of n that has lost a share n u at most loses (n + 1) u of all with it."""
+    return f"""{FLOAT}
+s = rnd(s_); a = rnd(a_); x = rnd(x_); t = rnd(s + rnd(a * x));
+{{ S in [1b-100, 1b100] /\\ a * x in [1b-100, 1b100] /\\ s -/ S in [-{n}b-24, {2 * n}b-24] -> t -/ (S + a * x) in [-{n + 1}b-24, {2 * n + 2}b-24] }}"""
+
+
+def factors(n: int) -> str:
+    """A product of n factors that are nearly 1."""
+    known = " /\\ ".join(f"d{i} in [-1b-24, 1b-24]" for i in range(n))
+    product = "\n".join(f"p{i} = {f'p{i - 1} * ' if i else ''}(1 + d{i});" for i in range(n))
+    return f"{product}\n{{ {known} -> |p{n - 1} - 1| <= {below(Fraction(gamma32(n)))} }}"
+
+
+def covers(factor: Fraction, roundings: int) -> str:
+    """A factor that is at least what so many roundings take."""
+    return f"{{ w in [{below(factor)}, {below(factor)}] -> w * (1 - {roundings}b-24) >= 1 }}"
+
+
+def hulls() -> set[tuple[int, int, int]]:
+    """Lags of all signals together, signals, modes of the shipped hulls."""
+    found = set()
+    for source in shipped():
+        text = source.read_text()
+        taps = {name: sum(int(x) for x in re.findall(r"\d+", table)) for name, table in TAPS.findall(text)}
+        for match in HULL.finditer(text):
+            modes = MODES.search(match[0])
+            found.add((taps[match[2]], int(match[1]), int(modes[1]) if modes else 0))
+    return found
+
+
+def widened() -> Iterator[tuple[str, str]]:
+    """What tables are widened by, against the roundings of the C code: a product, as many sums as there are numbers before and after it, bias, theta."""
+    for lags, width, modes in sorted(hulls()):
+        made = 1 + Fraction(share32(uio_hull.roundings(lags, modes) if modes else hull.roundings(lags, width)))
+        yield f"hull of {lags} lags, {modes} modes", covers(made * (1 - DOUBLE), lags + modes + 2)
+        tail = made + Fraction(1, 10**6) - DIGITS if not modes else (made * (1 - DIGITS) ** 2) * Fraction(uio_hull.WIDER) ** 2
+        yield f"what leaves the lags of a hull of {width} signals, {modes} modes", covers(tail * (1 - DOUBLE), (width + 1) + modes + 3)
+    yield "a tail's decay", covers(1 / Fraction(hull.SLOWER), 2)
+    yield "a mode's decay", covers(Fraction(uio_hull.WIDER) * (1 - DIGITS), 2)
+    for window, width, extras, made in sorted(banks()):
+        read = 1 + Fraction(gamma32(window * width))
+        yield f"bank of {window} x {width}, {extras} extras", covers(made / read, window * (width + extras) + 2)
+        yield f"radii of nothing else in a bank of {window} x {width}, {extras} extras", covers(made * (1 - DOUBLE), window * (width + extras) + 1)
+    for width, groups in sorted({*mismatches(), *((width, GROUPS_MAX) for width in (1, GROUPS_MAX, LARGEST))}):
+        yield f"mismatch of {width} signals, {groups} groups", covers((1 + Fraction(share32(mismatch.roundings(width, groups)))) * (1 - DOUBLE), width + 2 + groups)
+    for columns, width, disturbances, order in ((16, 6, 3, 4), (LARGEST, LARGEST, LARGEST, LARGEST), (1, 1, 0, 1)):
+        made = 1 + Fraction(share32(zonotope.roundings(columns + width + disturbances + order, width, order)))
+        yield f"zonotope of {columns} columns, {width} signals, {disturbances} disturbances, order {order}", covers(made * (1 - DOUBLE), columns + width + order + 3)
+
+
 def lengths() -> list[int]:
     """Terms of a row of each generator and observer that ships."""
-    found = {int(order) + int(width) for source in sorted((ROOT / "firmware/models").glob("*.c")) for order, width in SHAPE.findall(source.read_text())}
+    found = {int(order) + int(width) for source in shipped() for order, width in SHAPE.findall(source.read_text())}
     if not found:
         sys.exit("no shipped table says its order and width: has their layout changed?")
     return sorted(found)
+
+
+def banks() -> set[tuple[int, int, int, Fraction]]:
+    """Window, signals, extras, and factor on radii of the shipped banks."""
+    found = {(int(m[0]), int(m[1]), int(m[2]), Fraction(float.fromhex(m[3]))) for source in shipped() for m in BANK.findall(source.read_text())}
+    if not found:
+        sys.exit("no shipped bank says its window: has its layout changed?")
+    return found
+
+
+def mismatches() -> set[tuple[int, int]]:
+    """Signals that a mismatch reads, and groups of its model."""
+    found = set()
+    for source in shipped():
+        text = source.read_text()
+        groups = GROUPS.search(source.with_suffix(".h").read_text())
+        found |= {(int(width), int(groups[1])) for width in MISMATCH.findall(text) if groups}
+    if not found:
+        sys.exit("no shipped mismatch says its width: has its layout changed?")
+    return found
+
+
+def shipped() -> list[Path]:
+    """Sources of the shipped tables."""
+    return sorted((ROOT / "firmware/models").glob("*.c"))
 
 
 def scripts() -> Iterator[tuple[str, str]]:
@@ -113,6 +207,12 @@ def scripts() -> Iterator[tuple[str, str]]:
                     yield f"{name}: {s.name} above its offset", codec(s, t, True)
                     yield f"{name}: {s.name} below its offset", codec(s, t, False)
     yield from shifts()
+    longest = max([lags + modes for lags, _, modes in hulls()] + [window * (width + extras) for window, width, extras, _ in banks()])
+    for n in range(1, longest + 3):
+        yield f"sum of {n}", growing(n)
+    for n in sorted({window * width for window, width, _, _ in banks()}):
+        yield f"gamma of {n}", factors(n)
+    yield from widened()
 
 
 def proved(item: tuple[int, tuple[str, str]], work: Path) -> str:
@@ -140,8 +240,12 @@ def main() -> int:
                 return 1
     names = [name for _, (name, _) in items]
     dots, moved = [n for n in names if n.startswith("dot")], [n for n in names if n.startswith("q31")]
-    ranges = len(names) - len(dots) - len(moved)
-    text = f"{len(items)} scripts: sums of products of {len(dots)} shipped lengths, up to {lengths()[-1]} terms; {ranges} ranges of signals; {len(moved)} shifts"
+    sums, wide = [n for n in names if n.startswith("sum of")], len(list(widened()))
+    ranges = len([n for n in names if n.endswith(("as sent", "its offset"))])
+    text = (
+        f"{len(items)} scripts: sums of products of {len(dots)} shipped lengths, up to {lengths()[-1]} terms; {ranges} ranges of signals; {len(moved)} shifts; "
+        f"sums of numbers above 0 up to {len(sums)}; {wide} factors that tables are widened by"
+    )
     write_to(result, [("The bounds of rounding that the design adds to thresholds and radii are not below what the arithmetic of the C code can lose", text)])
     print(f"  ok  gappa: {text}")
     return 0

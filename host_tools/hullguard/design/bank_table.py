@@ -54,8 +54,7 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     form = window_form(model.plant, bank.window, varying)
     weight = nearest32(full_weight(model, form, nearest32(bank.weight)))
     terms = bank.window * (len(model.signals) + form.Me.shape[1] // bank.window) + 4
-    gamma = gamma32(terms)
-    widen = float(up32(np.array((1 + gamma) * (1 + gamma) * DOUBLE)))
+    gamma, widen = gamma32(terms), widened(terms)
     values = _values(model, stored, bank)
     bias = _healthy(model, form, weight, _states(model, stored, bank, fault_size), values[model.inputs])
     bias += gamma * mul(np.abs(weight).reshape(len(weight), -1), np.tile(values, bank.window)[:, None])[:, 0]
@@ -75,6 +74,12 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
         feeds=sum(1 << i for i, group in enumerate(model.groups) if any(used[s] for s in group.signals)),
         extra_weight=_by_lag(up32(extra * widen)) if extra.shape[2] else (),
     )
+
+
+def widened(terms: int) -> float:
+    """Factor on radii that covers the rounding of as many products in J, and in r the part that grows with the radii (proved: tests/gappa)."""
+    gamma = gamma32(terms)
+    return float(up32(np.array((1 + gamma) * (1 + gamma) * DOUBLE)))
 
 
 def _by_lag(a: Array) -> tuple[tuple[tuple[float, ...], ...], ...]:

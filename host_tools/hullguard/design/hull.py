@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hullguard.design.arith import U32, digits, gamma32, mul, nearest32, powers, row_sums, up32
+from hullguard.design.arith import digits, gamma32, mul, nearest32, powers, row_sums, share32, up32
 from hullguard.design.observer import SubPlant
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -321,6 +321,11 @@ class Given:
     derived: Array  # n x derived signals: how those disturb the state that have a radius only
 
 
+def roundings(taps: int, width: int) -> int:
+    """Of a number on its way into a threshold: as many products are added up as there are lags of all signals together, then tails, bias and theta."""
+    return taps + 2 * width + 16
+
+
 def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> HullTables:
     """All tables of one generator, rounded up to float32; for fixed point not yet rounded."""
     T, plant, ranges, expected = given.T, given.plant, given.ranges, given.expected
@@ -370,7 +375,7 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
     driven = np.concatenate([np.zeros((1, F.shape[1])), driven[:-1]]) + at_once
     steady = limit + share.sum(0)
     used = np.where(np.arange(max(taps.max(), 1))[:, None, None] < taps, weights[: max(taps.max(), 1)], 0.0)
-    widen = DOUBLE if fixed else 1 + (int(taps.sum()) + 2 * weights.shape[2] + 16) * U32 * 1.01
+    widen = DOUBLE if fixed else 1 + share32(roundings(int(taps.sum()), weights.shape[2]))
     up: Callable[[Array], Array] = np.asarray if fixed else up32
     slow = decay * SLOWER
     settle = fixed.like.settle if fixed else max(start.settled(driven, limit, steady, slow) for start in (rest, moving))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hullguard.design.arith import U32, mul, row_sums, up32
+from hullguard.design.arith import mul, row_sums, share32, up32
 from hullguard.design.tables import MismatchTable, rows
 from hullguard.model.schema import Model
 from hullguard.model.table import Array
@@ -44,13 +44,18 @@ def mismatch_table(model: Model, state: Array) -> tuple[MismatchTable, tuple[int
     gain = np.hstack([Dy, Du])
     used = np.flatnonzero(np.any(gain > 0, axis=0))
     places = np.array(model.outputs + model.inputs)
-    wider = 1 + (len(used) + 8) * U32 * 1.01  # more than adding up in float32, and growing later, can lose
+    wider = 1 + share32(roundings(len(used), len(model.groups)))
     table = MismatchTable(
         signal=tuple(int(i) for i in places[used]),
         constant=tuple(float(x) for x in up32(d0[moved] * wider)),
         gain=rows(up32(gain[np.ix_(moved, used)] * wider)),
     )
     return table, tuple(int(i) for i in moved)
+
+
+def roundings(width: int, groups: int) -> int:
+    """Of a number on its way into a derived radius: magnitude and radius, the products of `width` signals, the constant; then it grows, once a group that shows a loss."""
+    return width + 2 + max(6, groups)
 
 
 def _measured_by(model: Model, state: int) -> int | None:

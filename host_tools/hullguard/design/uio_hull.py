@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hullguard.design.arith import U32, digits, mul, powers, row_sums, up32
+from hullguard.design.arith import digits, mul, powers, row_sums, share32, up32
 from hullguard.design.hull import DOUBLE, READY_SHARE, TAIL_SHARE, Fixed, HullTables, Linear, Ranges, rounding_of
 from hullguard.design.observer import SubPlant
 from hullguard.errors import InputError
@@ -147,7 +147,7 @@ def build(lin: Linear, given: ModalGiven, where: str, fixed: Fixed | None = None
     starts = {name: np.abs(inverse @ T) @ x * WIDER for name, x in (("rest", ranges.initial), ("moving", ranges.state))}
     fast = mode_decay**taps < FAST
     settle = fixed.like.settle if fixed else 1 + next((k for k in range(SETTLE_MAX) if np.all(mode_decay[fast] ** k < GONE)), SETTLE_MAX)
-    widen = DOUBLE if fixed else 1 + (taps * weights.shape[2] + len(decay) + 16) * U32 * 1.01
+    widen = DOUBLE if fixed else 1 + share32(roundings(taps * weights.shape[2], len(decay)))
     course = mode_decay[:, None] ** np.arange(settle)
     rows = {name: bias + ((np.abs(out) * WIDER * np.where(fast, x, 0.0)) @ course).T for name, x in starts.items()}
     # theta moves on once before it is first used, and its output counts it as taps - 1 samples older.
@@ -175,6 +175,11 @@ def build(lin: Linear, given: ModalGiven, where: str, fixed: Fixed | None = None
         steady_bias=bias,
         steady=steady,
     )
+
+
+def roundings(taps: int, modes: int) -> int:
+    """Of a number on its way into a radius: the lags of all signals together, the modes, then bias and theta."""
+    return taps + modes + 16
 
 
 def _taps(weights: Array, out: Array, decay: Array, into: Array, radius: Array, late: Array, least: int) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from hullguard.design import hull
-from hullguard.design.arith import U32, digits, gamma32, mul, nearest32, row_sums, up32
+from hullguard.design.arith import U32, digits, gamma32, mul, nearest32, row_sums, share32, up32
 from hullguard.design.observer import SubPlant
 from hullguard.design.tables import rows
 from hullguard.design.zonotope_table import BOX, TRUNCATE, ZonotopeTable
@@ -270,6 +270,11 @@ def build(
     return table
 
 
+def roundings(terms: int, width: int, order: int) -> int:
+    """Of a number on its way into a threshold: `terms` columns and rows, the signals, the spread, then the bias."""
+    return terms + width + order + 20
+
+
 def _table(
     found: Modal, lin: hull.Linear, radius: Array, exact: hull.HullTables, constants: _Constants, signal: tuple[int, ...], columns: int, reduction: int
 ) -> tuple[ZonotopeTable, float]:
@@ -278,7 +283,7 @@ def _table(
     Y, block = found.transform, found.block
     initial = [nearest32(mul(Y, c)) for c in constants.initial]
     terms = max(columns + width + constants.every.shape[1], initial[0].shape[1]) + s
-    wider = (terms + width + s + 20) * U32 * 1.01
+    wider = share32(roundings(terms, width, s))
     Lam = scipy.linalg.block_diag(*[mul(mul(Y[p], lin.state), found.inverse[:, p]) for p in _places(block)])
     kept = _Stored(nearest32(Lam), nearest32(mul(Y, lin.input)), nearest32(mul(Y, constants.every)), nearest32(mul(lin.output, found.inverse) * (1 + wider)), wider)
     norm = up32(_norms(kept.Lam, found) * (1 + 4 * U32) + 1e-12)
