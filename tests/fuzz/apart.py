@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import resource
 import signal
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
@@ -25,18 +24,18 @@ class Hang(BaseException):
 def _serve(link: Connection, near: Connection, seconds: int) -> None:
     """One call after the other, each with its own limit of processor time, until the other end is closed."""
     near.close()
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)  # it dies of it, also within a library's own loop
     while True:
         try:
             call, *given = link.recv()
         except EOFError:
             return
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime) + 1 + seconds, hard))
+        signal.setitimer(signal.ITIMER_PROF, seconds)
         try:
             answer: tuple[bool, Any] = (True, call(*given))
         except Exception as error:  # the caller's business
             answer = (False, error)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         link.send(answer)
 
 
@@ -87,7 +86,7 @@ class Lasting:
             well, found = self._link.recv()
         except (EOFError, ConnectionResetError):
             died = self.end()
-            raise Hang if died == -signal.SIGXCPU else BrokenProcessPool(f"died of {died}") from None
+            raise Hang if died == -signal.SIGPROF else BrokenProcessPool(f"died of {died}") from None
         if well:
             return found
         raise found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import resource
 import tomllib
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -19,6 +20,7 @@ from hullguard.model.table import Array
 
 KEYS = ("A", "B", "C", "D")
 TIMES = ("Ts", "dt", "sample_time_s")
+MAT_S = 3  # of the processor, for a file of matrices
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,9 @@ def _matrix_text(key: str, text: str) -> list[list[float]]:
 def _loaded(path: Path) -> dict[str, Any]:
     import scipy.io
 
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime) + MAT_S, hard))
     try:
         return {k: v for k, v in scipy.io.loadmat(path).items() if not k.startswith("__")}
     except NotImplementedError as error:
@@ -121,7 +126,7 @@ def _loaded(path: Path) -> dict[str, Any]:
 
 
 def _mat(path: Path) -> dict[str, Any]:
-    # In a process of its own: on some damaged files SciPy's reader dies of a segmentation fault.
+    # In a process of its own: on some damaged files SciPy's reader dies of a segmentation fault, and on some it never ends.
     with ProcessPoolExecutor(1) as apart:
         try:
             held = apart.submit(_loaded, path).result()
