@@ -4,7 +4,7 @@
 
 FUZZ := $(BUILD)/fuzz
 RUNTIME := 1200
-FUZZ_SECONDS := 15
+FUZZ_SECONDS := 10
 FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_ENGINES := libfuzzer afl
 FUZZ_SANITIZE := -O1 -g -fno-omit-frame-pointer -fno-sanitize-recover=all
@@ -28,7 +28,7 @@ fuzz_run = PYTHONPATH=host_tools $(PY) tests/fuzz/fuzz.py --build $(FUZZ) $(1)
 
 .PHONY: fuzz fuzz-quick fuzz-readers $(FUZZ_TARGETS:%=fuzz-%)
 CHECK_PARTS += fuzz-quick
-fuzz-quick: lib $(call fuzz_programs,libfuzzer) ## fuzzing, short: corpus and regressions of all targets, 15 s each, some thousand cases a reader of files
+fuzz-quick: lib $(call fuzz_programs,libfuzzer) ## fuzzing, short: corpus and regressions of all targets, 10 s each, some thousand cases a reader of files
 	@$(call fuzz_run,quick --seconds $(FUZZ_SECONDS) $(FUZZ_TARGETS))
 DEEP_PARTS += fuzz
 fuzz: lib $(call fuzz_programs,$(FUZZ_ENGINES)) ## fuzzing, long: RUNTIME processor seconds a target and engine, 10^5 cases a reader; adds to tests/fuzz/ledger.toml

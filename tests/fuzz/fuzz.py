@@ -1,6 +1,6 @@
 """Runs the fuzz targets and the readers' cases (fuzz.mk), and keeps corpus, regressions and the ledger of what was executed.
 
-    fuzz.py quick  --seconds 15 TARGET ..     corpus and regressions of each target, then libFuzzer for so long; a few thousand cases a reader
+    fuzz.py quick  --seconds 10 TARGET ..     corpus and regressions of each target, then libFuzzer for so long; a few thousand cases a reader
     fuzz.py long   --seconds 1200 TARGET ..   libFuzzer and AFL++ for so much processor time each, 10^5 cases a reader in the ledger; adds to ledger.toml
     fuzz.py pack TARGET ..                    a small corpus from what the long runs found: corpus/TARGET.hex
     fuzz.py keep TARGET FILE NAME             an input that broke an invariant becomes a regression: regress/TARGET.hex
@@ -17,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -185,28 +186,36 @@ def readers(build: Path, arguments: list[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
+def quick_one(build: Path, target: str, seconds: int, seed: int) -> tuple[str, bool]:
+    """Replay and a short run of a target: what to say of it, and whether all is well."""
+    executed, found, log = lib_fuzzer(target, build, seconds, seed, False)
+    inputs = sum(len(read_hex(HERE / kind / f"{target}.hex")) for kind in ("regress", "corpus"))
+    if found:
+        return f"FAILED {fail(target, 'libFuzzer', log, found)}", False
+    return f"  ok  fuzz {target}: {inputs} inputs of corpus and regressions, {executed} executions", True
+
+
+def quick_readers(build: Path, seed: int) -> tuple[str, bool]:
+    """The same of the readers' cases."""
+    beside = readers(build, ["--cases", str(READER_CASES_QUICK), "--seed", str(seed)])
+    said, _ = beside.communicate()
+    return said.rstrip("\n"), beside.returncode == 0
+
+
 def quick(build: Path, targets: list[str], seconds: int, files: bool) -> int:
-    """Replay and a short run of each target; any finding is a failure. Writes what the gate promises."""
+    """All of them, as many at a time as there are processors; any finding is a failure. Writes what the gate promises."""
     seed = int(os.environ.get("HULLGUARD_SEED", "1"))
-    beside = readers(build, ["--cases", str(READER_CASES_QUICK), "--seed", str(seed)]) if files else None
-    failures = []
-    for target in targets:
-        executed, found, log = lib_fuzzer(target, build, seconds, seed, False)
-        inputs = sum(len(read_hex(HERE / kind / f"{target}.hex")) for kind in ("regress", "corpus"))
-        if found:
-            failures.append(fail(target, "libFuzzer", log, found))
-        else:
-            print(f"  ok  fuzz {target}: {inputs} inputs of corpus and regressions, {executed} executions", flush=True)
-    if beside is not None:
-        said, _ = beside.communicate()
-        print(said, end="")
-        if beside.returncode != 0:
-            failures.append("readers: see above")
-    for failure in failures:
-        print(f"FAILED {failure}")
-    if not failures and files:
+    with ThreadPoolExecutor(os.cpu_count()) as crew:
+        parts = [crew.submit(quick_readers, build, seed)] if files else []
+        parts += [crew.submit(quick_one, build, target, seconds, seed) for target in targets]
+        failed = False
+        for part in parts:
+            said, well = part.result()
+            print(said, flush=True)
+            failed = failed or not well
+    if not failed and files:
         write_results(build, targets)
-    return 1 if failures else 0
+    return 1 if failed else 0
 
 
 def write_results(build: Path, targets: list[str]) -> None:
@@ -303,7 +312,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Fuzz targets and readers.")
     parser.add_argument("--build", type=Path, default=Path("build/fuzz"))
     parser.add_argument("what", choices=["quick", "long", "pack", "keep"])
-    parser.add_argument("--seconds", type=int, default=15)
+    parser.add_argument("--seconds", type=int, default=10)
     parser.add_argument("--engines", default="libfuzzer,afl,readers")
     parser.add_argument("--no-readers", action="store_true", help="quick: the C targets alone")
     parser.add_argument("targets", nargs="+")
