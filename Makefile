@@ -55,7 +55,7 @@ UNIT_DATA   := $(wildcard tests/fixtures/*)
 RIGS        := $(patsubst tests/contract/rig_%.c,%,$(wildcard tests/contract/rig_*.c))
 
 OBJECTS :=
-TEST_PARTS := lib apps pytest-host# the longest one first
+TEST_PARTS := lib apps pytest-node# the one that mostly waits first
 CHECK_PARTS := lib
 DEEP_PARTS := lib
 
@@ -208,4 +208,5 @@ $(foreach t,$(TOOLSETS),$(foreach r,$(RIGS),$(eval $(call contract_program,$(t),
 # --- parts of other folders --------------------------------------------------------------------------------------------------------------
 
 include $(wildcard firmware/*.mk firmware/*/*.mk hal/*.mk hal/*/*.mk host_tools/*.mk tests/*.mk tests/*/*.mk)
+TEST_PARTS += pytest-host# last, with a process for each processor
 -include $(OBJECTS:.o=.d)

@@ -19,6 +19,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -178,12 +179,12 @@ def judged(faults: list[Fault], first: bool, jobs: int) -> list[str]:
         copies.put(Copy(ROOT / BUILD / "seeded" / str(job), files))
 
     def one(fault: Fault) -> str:
-        copy = copies.get()
+        copy, start = copies.get(), time.monotonic()
         try:
             wrong = copy.judge(fault, first)
         finally:
             copies.put(copy)
-        print(f"  {'MISSED' if wrong else 'red   '}  {fault.of:<18} {fault.name:<44} {fault.file}{': ' + wrong if wrong else ''}", flush=True)
+        print(f"  {'MISSED' if wrong else 'red   '}  {fault.of:<18} {fault.name:<44} {time.monotonic() - start:4.0f} s  {fault.file}{': ' + wrong if wrong else ''}", flush=True)
         return wrong
 
     with ThreadPoolExecutor(jobs) as pool:
