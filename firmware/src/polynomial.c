@@ -668,9 +668,9 @@ static void compare(hg_polynomial *self)
         drift = hg_real_max(drift, self->mean[j] * self->mean[j]);
     }
     judgement->plain = hg_linalg_root(square);
-    judgement->threshold = (config->kappa * hg_linalg_root(trace)) + hg_linalg_root(radius);
-    judgement->joint = dot(self->t, self->t, config->judged);
-    judgement->drift = drift * ((HG_REAL_C(2.0) - config->weight) / config->weight);
+    judgement->threshold = hg_real_min((config->kappa * hg_linalg_root(trace)) + hg_linalg_root(radius), HG_REAL_MAX);
+    judgement->joint = hg_real_min(dot(self->t, self->t, config->judged), HG_REAL_MAX); /* squares of finite numbers */
+    judgement->drift = hg_real_min(drift * ((HG_REAL_C(2.0) - config->weight) / config->weight), HG_REAL_MAX);
     uint32_t above = (judgement->plain > judgement->threshold) ? HG_POLYNOMIAL_PLAIN : 0U;
     above |= (judgement->joint > config->joint) ? HG_POLYNOMIAL_JOINT : 0U;
     above |= (judgement->drift > config->drift) ? HG_POLYNOMIAL_DRIFT : 0U;

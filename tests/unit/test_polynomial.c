@@ -645,6 +645,40 @@ static void any_number_that_is_none_begins_again(void **state)
     assert_status(HG_E_NUMERIC, hg_polynomial_step(&p->self, both, both));
 }
 
+/* What is judged stays finite where a square of what is finite is not, and keeps its meaning. */
+static void a_judgement_beyond_a_number_is_the_largest(void **state)
+{
+    (void)state;
+    static const hg_real none = REAL_INF, largest = HG_REAL_MAX;
+    const double edge = sqrt((double)HG_REAL_MAX);
+    rig *p = fresh(0U);
+    set_up(p, 1U, 1U, 1U, false, false);
+    begin(p);
+    const hg_real y = R(500);
+    assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &largest));
+    assert_real((double)HG_REAL_MAX, p->self.judgement.threshold);
+    assert_count(0U, p->self.judgement.above & HG_POLYNOMIAL_PLAIN);
+
+    p = fresh(0U);
+    set_up(p, 1U, 1U, 1U, false, false);
+    p->P0[0] = R(1e-10);
+    p->r[0] = R(1e-10);
+    p->range[0] = HG_REAL_MAX;
+    p->config.weight = R(1e-10);
+    begin(p);
+    assert_status(HG_OK, step(p, 0.25 * edge));
+    assert_real((double)HG_REAL_MAX, p->self.judgement.joint);
+    assert_true((p->self.judgement.above & HG_POLYNOMIAL_JOINT) != 0U);
+
+    p = fresh(0U);
+    set_up(p, 1U, 1U, 1U, false, false);
+    begin(p);
+    p->self.mean[0] = R(2.0 * edge);
+    assert_status(HG_OK, hg_polynomial_step(&p->self, &y, &none));
+    assert_real((double)HG_REAL_MAX, p->self.judgement.drift);
+    assert_count(HG_POLYNOMIAL_DRIFT, p->self.judgement.above);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -671,6 +705,7 @@ int main(void)
         cmocka_unit_test(an_estimate_with_no_covariance_is_not_made),
         cmocka_unit_test(a_state_that_is_none_begins_again),
         cmocka_unit_test(any_number_that_is_none_begins_again),
+        cmocka_unit_test(a_judgement_beyond_a_number_is_the_largest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

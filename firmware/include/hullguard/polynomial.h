@@ -129,7 +129,7 @@ uint32_t hg_polynomial_reals(uint8_t states, uint8_t outputs, uint8_t degree, bo
 #define HG_POLYNOMIAL_JOINT 2U
 #define HG_POLYNOMIAL_DRIFT 4U
 
-typedef struct {             /* of the last sample */
+typedef struct {             /* of the last sample; what is beyond a number is HG_REAL_MAX */
     hg_real plain;           /* ||r||, measurement units, of the outputs there are */
     hg_real threshold;       /* kappa sqrt(tr S11) + ||radius|| */
     hg_real joint;           /* J2^2 */
