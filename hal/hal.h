@@ -120,8 +120,8 @@ static inline uint64_t hg_hal_now_us(const hg_hal *hal)
  *  @param[in] until_us  absolute, on the clock of hg_hal_now_us(); a past moment makes this a poll; HG_HAL_FOREVER: no deadline
  *  @retval HG_OK       call receive until it returns HG_E_EMPTY; it may do so at once (an error report, a change of the bus state)
  *  @retval HG_E_EMPTY  the moment has come and nothing has arrived; never returned early
- *  @retval HG_E_IO     asked to stop, by the means the backend's header names; stays so for every later wait
- *  Nothing else can fail. */
+ *  @retval HG_E_IO     the wait is over for good: asked to stop, by the means the backend's header names, which stays so for every later wait; or the
+ *                      operating system refused, and the backend keeps why */
 static inline hg_status hg_hal_wait(const hg_hal *hal, uint64_t until_us)
 {
     return hal->ops->wait(hal->self, until_us);
