@@ -86,16 +86,17 @@ static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
     }
 }
 
-/* What has arrived, a queue full of it at most, and then the deadline: what has come in time is not overtaken by the timer, and a bus that
- * never falls silent does not stop it. */
+/* What has arrived, a queue full of it at most, and then the deadline, by the clock before: what has come in time is not overtaken by the timer, and a bus
+ * that never falls silent does not stop it. */
 static void work(app *self)
 {
+    const uint64_t now_us = hg_hal_now_us(&self->hal);
     hg_can_frame frame;
     uint64_t at_us;
     for (uint32_t i = 0U; (i < HG_BOARD_DEPTH) && (hg_hal_receive(&self->hal, &frame, &at_us) == HG_OK); i++) {
         take_frame(self, &frame, at_us);
     }
-    if (hg_hal_now_us(&self->hal) >= self->deadline_us) {
+    if (now_us >= self->deadline_us) {
         hg_node_overdue(&storage.node);
         make_steps(self);
         self->deadline_us += PERIOD_US;

@@ -68,9 +68,10 @@ static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
     }
 }
 
-static void look_at_deadline(app *self)
+/* `now_us` is from before the frames were taken: what has arrived in time is not overtaken by the timer. */
+static void look_at_deadline(app *self, uint64_t now_us)
 {
-    if (hg_hal_now_us(&self->board) >= self->deadline_us) { /* what has arrived in time was taken before */
+    if (now_us >= self->deadline_us) {
         hg_node_overdue(&self->detector.node);
         make_steps(self);
         self->deadline_us += PERIOD_US;
@@ -98,10 +99,11 @@ int main(void)
     }
     self.deadline_us = hg_hal_now_us(&self.board) + PERIOD_US + SLACK_US;
     while (waited(&self)) {
+        const uint64_t now_us = hg_hal_now_us(&self.board);
         while (hg_hal_receive(&self.board, &frame, &at_us) == HG_OK) {
             take_frame(&self, &frame, at_us);
         }
-        look_at_deadline(&self);
+        look_at_deadline(&self, now_us);
     }
     return 0;
 }

@@ -380,10 +380,9 @@ static void take_frame(app *self, const hg_can_frame *frame, uint64_t at_us)
     }
 }
 
-/* Sample by sample, frames first: what has arrived in time is never overtaken by the timer. */
-static void look_at_deadline(app *self)
+/* Sample by sample. `now_us` is from before the frames were taken: what has arrived in time is never overtaken by the timer, even where this process was held up. */
+static void look_at_deadline(app *self, uint64_t now_us)
 {
-    const uint64_t now_us = hg_hal_now_us(&self->hal);
     if (now_us < self->deadline_us) {
         return;
     }
@@ -495,6 +494,7 @@ static int run(app *self)
         if (hg_hal_wait(&self->hal, wake_time(self)) == HG_E_IO) {
             return EXIT_SUCCESS; /* asked to stop */
         }
+        const uint64_t now_us = hg_hal_now_us(&self->hal);
         hg_status status = HG_OK;
         while ((!finished(self)) && (status == HG_OK)) {
             status = hg_hal_receive(&self->hal, &frame, &at_us);
@@ -508,7 +508,7 @@ static int run(app *self)
             return EXIT_BUS;
         }
         if (!finished(self)) {
-            look_at_deadline(self);
+            look_at_deadline(self, now_us);
         }
         if (self->options.status && (hg_hal_now_us(&self->hal) >= self->status_us)) {
             print_status(self);

@@ -51,10 +51,10 @@ class Script:
             frames += [] if lost(k, True) else [(at, tick)]
         return Script(drive, frames)
 
-    def run(self, folder: Path, *options: object, rest: bool = True) -> Ran:
+    def run(self, folder: Path, *options: object, rest: bool = True, held_us: int = 0) -> Ran:
         file, timing = folder / "frames", folder / "timing"
         file.write_text("".join(f"{at} {f.id} {f.flags} {f.data.hex() or '-'}\n" for at, f in self.frames))
-        done = command([str(VIRTUAL_NODE), str(file), *["--rest"] * rest, "--timing", str(timing), *map(str, options)])
+        done = command([str(VIRTUAL_NODE), str(file), str(held_us), *["--rest"] * rest, "--timing", str(timing), *map(str, options)])
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
         sent = [line.split() for line in done.stdout.splitlines() if line.startswith("sent ")]
         rows = [(int(at), Frame(int(number), 0, bytes.fromhex(data))) for _, at, number, data in sent]
@@ -102,6 +102,18 @@ def test_the_deadline_is_exact(slack_ms: float, after: int, tmp_path: Path) -> N
     else:
         assert (k, due, due) in ran.misses
     assert all(due_ == noticed for _, due_, noticed in ran.misses), "in virtual time nothing is noticed late"
+
+
+def test_a_closing_frame_that_came_while_the_node_was_held_up_is_not_late(tmp_path: Path) -> None:
+    """The node finds no frame more, is held up beyond the deadline, and the closing frame comes meanwhile, in time. One that does not come is still missed."""
+    held, samples = SLACK + 10_000, 40
+    script = Script.of(samples)
+    late = next(k for k in range(10, samples) if any(at == FIRST + k * T - 1000 for at, _ in script.frames))
+    script.frames = [(at + SLACK - 5000 if at == FIRST + late * T else at, f) for at, f in script.frames]
+    assert not script.run(tmp_path, "--samples", samples, held_us=held).misses
+    script.frames = [(at, f) for at, f in script.frames if at != FIRST + late * T + SLACK - 5000]
+    ((k, due, noticed),) = script.run(tmp_path, "--samples", samples, held_us=held).misses
+    assert (k, due) == (late, FIRST + late * T + SLACK) and due <= noticed <= due + held
 
 
 @pytest.mark.parametrize("count", [1, 2, 7])

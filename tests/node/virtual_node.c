@@ -1,8 +1,9 @@
 /** @file
  *  detector_node in virtual time: its own source, main and all, on a loopback bus in place of hal/socketcan. A run is exact to the
  *  microsecond and takes none.
- *      virtual_node FRAMES OPTION ...   FRAMES: a file of lines "TIME_US ID FLAGS HEX", in order of time, numbers decimal, FLAGS of can.h,
- *                                       HEX "-" for no data; the options are detector_node's
+ *      virtual_node FRAMES HELD_US OPTION ...   FRAMES: a file of lines "TIME_US ID FLAGS HEX", in order of time, numbers decimal, FLAGS of can.h,
+ *                                               HEX "-" for no data; the process is held up for HELD_US whenever it has found that there is no
+ *                                               frame more; the options are detector_node's
  *  After what detector_node says come the frames it sent, a line each: "sent TIME_US ID HEX". */
 int detector_node_main(int argc, char **argv);
 #define main detector_node_main
@@ -18,6 +19,8 @@ static hg_loopback node_end, listener;
 static hg_loopback_slot node_slots[DEPTH], listener_slots[DEPTH];
 static hg_hal_filter node_filter[FILTERS_MAX]; /* the node's own go with its stack */
 static const char *frames_name;
+static uint64_t held_us;
+static hg_hal_ops held_ops;
 
 /* Every frame of the file, under way from the beginning. */
 static bool put_frames(void)
@@ -58,10 +61,24 @@ hg_status hg_socketcan_open(hg_socketcan *self, const char *interface, const hg_
     return good ? HG_OK : HG_E_IO;
 }
 
+static hg_status held_receive(void *self, hg_can_frame *frame, uint64_t *time_us)
+{
+    const hg_hal inner = hg_loopback_hal(self);
+    const hg_status status = hg_hal_receive(&inner, frame, time_us);
+    if (status == HG_E_EMPTY) {
+        hg_loopback_set_time(&bus, hg_hal_now_us(&inner) + held_us);
+    }
+    return status;
+}
+
 hg_hal hg_socketcan_hal(hg_socketcan *self)
 {
     (void)self;
-    return hg_loopback_hal(&node_end);
+    hg_hal hal = hg_loopback_hal(&node_end);
+    held_ops = *hal.ops;
+    held_ops.receive = held_receive;
+    hal.ops = &held_ops;
+    return hal;
 }
 
 void hg_socketcan_close(hg_socketcan *self)
@@ -71,13 +88,14 @@ void hg_socketcan_close(hg_socketcan *self)
 
 int main(int argc, char **argv)
 {
-    if (argc < 2) {
-        (void)fputs("usage: virtual_node FRAMES OPTION ...\n", stderr);
+    if (argc < 3) {
+        (void)fputs("usage: virtual_node FRAMES HELD_US OPTION ...\n", stderr);
         return EXIT_INPUT;
     }
     frames_name = argv[1];
-    argv[1] = argv[0];
-    const int result = detector_node_main(argc - 1, &argv[1]);
+    held_us = strtoull(argv[2], NULL, 10);
+    argv[2] = argv[0];
+    const int result = detector_node_main(argc - 2, &argv[2]);
     const hg_hal hal = hg_loopback_hal(&listener);
     hg_can_frame frame;
     uint64_t at_us;
