@@ -11,7 +11,7 @@
 
 #include "proof.h"
 
-#include "hullguard/detector.h"
+#include "hullguard/node.h"
 
 #include <stdlib.h>
 
@@ -42,6 +42,13 @@ static inline bool state_hold(const hg_hold *self)
            writable(self->value, width) && writable(self->promise, width);
 }
 
+/* Its memory as hg_hold_start() was given it: begun again, it takes it so. */
+static inline bool whole_hold(const hg_hold *self)
+{
+    const uint8_t width = self->config->trigger->width;
+    return (self->previous == &self->sent[width]) && (self->promise == &self->value[width]) && writable(self->sent, HG_HOLD_CODES(width)) && writable(self->value, HG_HOLD_REALS(width));
+}
+
 static inline bool kept_hold(const hg_hold *self, const hg_hold *before)
 {
     return (self->config == before->config) && (self->sent == before->sent) && (self->previous == before->previous) && (self->value == before->value) && (self->promise == before->promise);
@@ -53,10 +60,12 @@ static inline bool requires_hold_start(const hg_hold_config *config, const int32
     return (config->trigger == NULL) || (!hg_trigger_valid(config->trigger)) || (writable(codes, HG_HOLD_CODES(config->trigger->width)) && writable(reals, HG_HOLD_REALS(config->trigger->width)));
 }
 
-static inline bool ensures_hold_start(const hg_hold *self, const hg_hold_config *config, const int32_t *codes, const hg_real *reals, hg_status status)
+static inline bool ensures_hold_start(const hg_hold *self, const hg_hold *before, const hg_hold_config *config, const int32_t *codes, const hg_real *reals, hg_status status)
 {
-    if (status != HG_OK) {
-        return status == HG_E_CONFIG;
+    if (status != HG_OK) { /* nothing has changed */
+        return (status == HG_E_CONFIG) && kept_hold(self, before) && (self->age == before->age) && (self->good == before->good) && (self->level == before->level) &&
+               (self->silence == before->silence) && (self->holes == before->holes) && (self->seen == before->seen) && (self->recovering == before->recovering) &&
+               (self->fresh == before->fresh) && (self->lost == before->lost) && (self->doubt == before->doubt) && (self->gap == before->gap) && (self->gap_age == before->gap_age);
     }
     const uint8_t width = config->trigger->width;
     return (self->config == config) && hg_trigger_valid(config->trigger) && (self->sent == codes) && (self->previous == &codes[width]) && (self->value == reals) &&
@@ -322,8 +331,55 @@ static inline bool state_detector(const hg_detector *self)
 {
     const hg_detector_config *config = self->config;
     bool there = writable(self->value, config->width) && writable(self->r, config->residuals) && writable(self->J, config->residuals) && writable(self->past, config->width);
-    there = there && state_ring(&self->radii) && (self->radii.width == config->width) && (self->radii.length == config->history);
+    there = there && writable(self->radius, config->width) && state_ring(&self->radii) && (self->radii.width == config->width) && (self->radii.length == config->history);
     return there && ((config->banks == 0U) || (state_ring(&self->values) && (self->values.width == config->signals) && (self->values.length == config->window)));
+}
+
+/* All of a started detector, parts and tables: what its step needs, and what start, step and restart leave. */
+static inline bool started_detector(const hg_detector *self)
+{
+    const hg_detector_config *config = self->config;
+    const hg_detector_memory *part = &self->memory;
+    bool started = valid_signals(config) && valid_judges(config) && state_detector(self) && writable(part->alarm, config->decision.generators) && (self->decision.alarm == part->alarm);
+    for (uint8_t i = 0U; i < config->groups; i++) {
+        started = started && (part->hold[i].config == &config->hold[i]) && state_hold(&part->hold[i]) && whole_hold(&part->hold[i]);
+    }
+    for (uint8_t i = 0U; i < config->predictors; i++) {
+        started = started && (part->predict[i].config == &config->predict[i]) && state_predict(&part->predict[i]);
+    }
+    for (uint8_t g = 0U; g < config->generators; g++) {
+        started = started && (part->residual[g].config == &config->residual[g]) && state_residual(&part->residual[g]);
+        if (config->hull != NULL) {
+            started = started && (part->hull[g].config == &config->hull[g]) && requires_hull_reset(&part->hull[g]);
+        }
+#if HG_WITH_ZONOTOPE
+        if (config->hull == NULL) {
+            started = started && (part->zonotope[g].config == &config->zonotope[g]) && state_zonotope(&part->zonotope[g], config->width);
+        }
+#endif
+    }
+    for (uint8_t b = 0U; b < config->banks; b++) {
+        started = started && (part->bank[b].config == &config->bank[b]) && requires_bank_reset(&part->bank[b]);
+    }
+    return started;
+}
+
+static inline bool requires_detector_start(const hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory)
+{
+    return writable(self, 1U) && readable(config, 1U) && readable(memory, 1U);
+}
+
+static inline bool ensures_detector_start(const hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory, hg_status status)
+{
+    if (status != HG_OK) {
+        return (status == HG_E_ARGUMENT) || (status == HG_E_SIZE) || (status == HG_E_CONFIG);
+    }
+    return (self->config == config) && (self->memory.hold == memory->hold) && (self->memory.alarm == memory->alarm) && (self->refusals == 0U);
+}
+
+static inline bool requires_detector_receive(const hg_detector *self, uint8_t group, const int32_t *code)
+{
+    return started_detector(self) && ((group >= self->config->groups) || readable(code, self->config->hold[group].trigger->width));
 }
 
 static inline bool ensures_detector_receive(const hg_detector *self, uint8_t group, hg_status status)
@@ -332,6 +388,66 @@ static inline bool ensures_detector_receive(const hg_detector *self, uint8_t gro
         return status == HG_E_ARGUMENT;
     }
     return ((status == HG_OK) || (status == HG_E_REPEATED) || (status == HG_E_NUMERIC)) && state_hold(&self->memory.hold[group]);
+}
+
+static inline bool ensures_detector_restart(const hg_detector *self, const hg_detector *before)
+{
+    return (self->samples == 0U) && (self->beginnings == (uint32_t)(before->beginnings + 1U)) && (self->refusals == before->refusals);
+}
+
+static inline bool ensures_detector_step(const hg_detector *self, const hg_detector *before, const hg_finding *finding, hg_status status)
+{
+    return ((status == HG_OK) || (status == HG_E_NUMERIC)) && (finding->plant <= HG_PLANT_CONFIRMED) && ((finding->basis == HG_BASIS_SET) || (finding->basis == HG_BASIS_STATISTICAL)) &&
+           (self->beginnings == before->beginnings) && (self->radii.newest < self->radii.length) && (self->radius == &self->radii.data[(uint16_t)self->radii.newest * self->radii.width]);
+}
+
+/* ---- e2e.h, frame.h ---- */
+
+static inline bool requires_e2e_check(const hg_e2e_config *config, const uint8_t *data, uint8_t length, const hg_e2e_header *header)
+{
+    const bool listed = (config->profile == HG_E2E_P02) || (config->profile == HG_E2E_P22);
+    return (config->profile >= HG_E2E_NONE) && (config->profile <= HG_E2E_P22) && ((!listed) || readable(config->data_ids, HG_E2E_IDS)) && readable(data, length) && writable(header, 1U);
+}
+
+static inline bool ensures_e2e_check(const hg_e2e_config *config, const hg_e2e_header *header, hg_status status)
+{
+    return (status == HG_E_CRC) || (status == HG_E_FORMAT) || ((status == HG_OK) && (header->counter < hg_e2e_modulus(config)) && (header->stamp <= 15U));
+}
+
+static inline bool requires_frame_matches(const hg_message *message, const hg_can_frame *frame)
+{
+    return readable(message, 1U) && readable(frame, 1U);
+}
+
+static inline bool ensures_frame_matches(const hg_message *message, const hg_can_frame *frame, bool matches)
+{
+    return (!matches) || ((frame->id == message->id) && (frame->length == message->length));
+}
+
+static inline bool requires_frame_unpack(const hg_message *message, const hg_can_frame *frame, const int32_t *code)
+{
+    return hg_frame_valid(message) && readable(frame, 1U) && writable(code, message->width);
+}
+
+static inline bool ensures_frame_unpack(hg_status status)
+{
+    return (status == HG_OK) || (status == HG_E_FORMAT) || (status == HG_E_NUMERIC);
+}
+
+/* ---- node.h ---- */
+
+/* Of a node between two calls: its links and its clock. */
+static inline bool state_node(const hg_node *self)
+{
+    const hg_node_config *config = self->config;
+    const uint16_t modulus = hg_e2e_modulus(config->message[config->closing].e2e);
+    bool in_range = (self->due <= 8U) && (self->ahead_max <= 7U) && (self->closing_counter < modulus) && (self->slipped_counter < modulus) && (self->slipped_stamp <= 15U) &&
+                    (self->verdict_counter <= 15U) && (self->status_counter <= 15U) && (config->closing < config->detector->groups) &&
+                    writable(self->closing, config->message[config->closing].width) && (self->detector.config == config->detector);
+    for (uint8_t i = 0U; i < config->detector->groups; i++) {
+        in_range = in_range && writable(&self->link[i], 1U) && (self->link[i].receiver.counter < hg_e2e_modulus(config->message[i].e2e));
+    }
+    return in_range;
 }
 
 #endif

@@ -1,169 +1,83 @@
 /** @file
  *  detector.h: holds, derived signals, generators, banks and filters under one decision. Tables and numbers are any; sizes are those of a run. */
-#include "stubs.h"
-
-#define SIGNALS (GROUPS * WIDTH)
-#define DERIVED ((PREDICTORS * WIDTH) + STATES)
-#define ALL (SIGNALS + DERIVED)
-#define JUDGES (GENERATORS + BANKS)
-#define RESIDUES ((GENERATORS * RESIDUALS) + BANKS)
-/* No array has no place. */
-#define PLACES(n) (((n) > 0U) ? (n) : 1U)
-
-/* Tables of any content for these sizes. */
-static hg_matrix any_matrix(uint8_t rows, uint8_t cols)
-{
-    return (hg_matrix){.rows = rows, .cols = cols, .exponent = 0, .data = any_array(hg_real, (size_t)rows * cols)};
-}
-
-static hg_hold_config *any_holds(void)
-{
-    hg_hold_config *hold = any_array(hg_hold_config, GROUPS);
-    for (uint8_t i = 0U; i < GROUPS; i++) {
-        hg_trigger_config *trigger = any_array(hg_trigger_config, 1U);
-        *trigger = (hg_trigger_config){.width = WIDTH, .levels = 1U, .interval_max = any_u8_in(1U, UINT8_MAX - 1U), .silence = any_array(uint8_t, 1U)};
-        hold[i] = (hg_hold_config){.trigger = trigger, .margin = any_u8(), .scale = any_array(hg_code_scale, WIDTH), .half = any_array(hg_real, WIDTH), .slew = NULL,
-                                   .span = any_array(hg_real, WIDTH), .middle = any_array(hg_real, WIDTH)};
-    }
-    return hold;
-}
-
-static hg_predict_config *any_predictors(void)
-{
-    hg_predict_config *predict = any_array(hg_predict_config, PLACES(PREDICTORS));
-    for (uint8_t i = 0U; i < PREDICTORS; i++) {
-        predict[i] = (hg_predict_config){.group = i, .first = (uint8_t)(i * WIDTH), .order = 1U, .width = WIDTH, .inputs = 1U, .input = any_array(uint8_t, 1U), .known = any_array(hg_real, 1U),
-                                         .correct = any_matrix(1U, WIDTH), .state = any_matrix(1U, 1U), .drive = any_matrix(1U, 1U), .output = any_matrix(WIDTH, 1U),
-                                         .direct = any_matrix(WIDTH, 1U), .fresh = any_array(hg_real, WIDTH), .horizon = any_u8(), .radius = any_array(hg_real, WIDTH), .settle = any_u16()};
-    }
-    return predict;
-}
-
-static const hg_mismatch_config *any_mismatch(void)
-{
-    hg_mismatch_config *mismatch = any_array(hg_mismatch_config, 1U);
-    *mismatch = (hg_mismatch_config){.states = STATES, .width = 1U, .exponent = 0, .signal = any_array(uint8_t, 1U), .constant = any_array(hg_real, PLACES(STATES)),
-                                     .gain = any_array(hg_real, PLACES(STATES))};
-    return (STATES > 0U) ? mismatch : NULL;
-}
-
-static hg_residual_config *any_residuals(void)
-{
-    hg_residual_config *residual = any_array(hg_residual_config, GENERATORS);
-    for (uint8_t g = 0U; g < GENERATORS; g++) {
-        residual[g] = (hg_residual_config){.order = 1U, .residuals = RESIDUALS, .width = 1U, .signal = any_array(uint8_t, 1U), .state = any_matrix(1U, 1U), .input = any_matrix(1U, 1U),
-                                           .output = any_matrix(RESIDUALS, 1U), .direct = any_matrix(RESIDUALS, 1U)};
-    }
-    return residual;
-}
+#include "any_detector.h"
 
 #if COLUMNS == 0U
-static hg_hull_config *any_hulls(void)
-{
-    hg_hull_config *hull = any_array(hg_hull_config, GENERATORS);
-    for (uint8_t g = 0U; g < GENERATORS; g++) {
-        hull[g] = (hg_hull_config){.residuals = RESIDUALS, .width = 1U, .exponent = 0, .signal = any_array(uint8_t, 1U), .taps = any_array(uint8_t, 1U), .weight = any_array(hg_real, RESIDUALS),
-                                   .settle = 1U, .rest = any_array(hg_real, RESIDUALS), .rest_left = any_array(hg_real, RESIDUALS), .moving = any_array(hg_real, RESIDUALS),
-                                   .moving_left = any_array(hg_real, RESIDUALS), .bias = any_array(hg_real, RESIDUALS), .ready_rest = any_u16(), .ready_moving = any_u16(),
-                                   .decay = any_array(hg_real, RESIDUALS), .modes = 0U};
-    }
-    return hull;
-}
-#define HULLS any_hulls()
-#define ZONOTOPES NULL
+#define THRESHOLD_REALS HG_HULL_REALS(RESIDUALS, 0U)
 #else
-static hg_zonotope_config *any_zonotopes(void)
-{
-    hg_zonotope_config *zonotope = any_array(hg_zonotope_config, GENERATORS);
-    for (uint8_t g = 0U; g < GENERATORS; g++) {
-        zonotope[g] = (hg_zonotope_config){.order = 1U, .residuals = RESIDUALS, .width = 1U, .disturbances = 1U, .initial = 0U, .columns = COLUMNS, .blocks = 1U,
-                                           .reduction = HG_REDUCTION_BALL, .signal = any_array(uint8_t, 1U), .block = any_array(uint8_t, 1U), .state = any_array(hg_real, 1U),
-                                           .input = any_array(hg_real, 1U), .disturbance = any_array(hg_real, 1U), .output = any_array(hg_real, RESIDUALS),
-                                           .outer = any_array(hg_real, RESIDUALS), .direct = any_array(hg_real, RESIDUALS), .settle = 1U, .bias_rest = any_array(hg_real, RESIDUALS),
-                                           .bias_moving = any_array(hg_real, RESIDUALS), .decay = any_array(hg_real, 1U), .always = any_array(hg_real, 1U),
-                                           .growth = any_array(hg_real, 1U), .output_growth = any_array(hg_real, RESIDUALS), .recover = any_u16(), .ready_rest = any_u16(),
-                                           .ready_moving = any_u16()};
-    }
-    return zonotope;
-}
-#define HULLS NULL
-#define ZONOTOPES any_zonotopes()
+#define THRESHOLD_REALS HG_ZONOTOPE_REALS(1U, COLUMNS, 2U)
 #endif
+/* Numbers of each part, in their order. */
+#define OWN_REALS ((2U * ALL) + (2U * RESIDUES))
+#define HOLD_REALS HG_HOLD_REALS(SIGNALS)
+#define RADII_REALS HG_RING_REALS(ALL, HISTORY)
+#define GENERATOR_REALS (GENERATORS * (HG_RESIDUAL_REALS(1U, 1U) + THRESHOLD_REALS))
+#define PREDICTOR_REALS (PREDICTORS * HG_PREDICT_REALS(1U, 1U, WIDTH))
 
-static hg_bank_config *any_banks(void)
-{
-    hg_bank_config *bank = any_array(hg_bank_config, PLACES(BANKS));
-    for (uint8_t b = 0U; b < BANKS; b++) {
-        hg_real widen;
-        bank[b] = (hg_bank_config){.certificates = 1U, .window = any_u8(), .width = 1U, .signal = any_array(uint8_t, 1U), .exponent = 0, .weight = any_array(hg_real, HISTORY), .extras = 0U,
-                                   .bias = any_array(hg_real, 1U), .widen = widen};
-    }
-    return bank;
-}
+#define REALS (OWN_REALS + HOLD_REALS + RADII_REALS + GENERATOR_REALS + PREDICTOR_REALS + HG_RING_REALS(SIGNALS, HISTORY))
 
-static hg_detector_config any_config(void)
+/* What the parts were given of the detector's numbers: one after another, none twice. */
+static bool in_order(const hg_detector *self, const hg_real *real)
 {
-    return (hg_detector_config){
-        .signals = SIGNALS, .width = ALL, .groups = GROUPS, .hold = any_holds(), .predictors = PREDICTORS, .predict = any_predictors(), .mismatch = any_mismatch(), .generators = GENERATORS,
-        .residual = any_residuals(), .hull = HULLS, .zonotope = ZONOTOPES, .banks = BANKS, .bank = any_banks(), .polynomials = 0U, .polynomial = NULL,
-        .decision = {.generators = JUDGES, .feeds = any_array(uint8_t, JUDGES), .faults = any_array(uint32_t, JUDGES), .up = any_u8_in(1U, UINT8_MAX), .down = any_u8_in(1U, UINT8_MAX),
-                     .latch = any_bool()},
-        .history = HISTORY, .window = HISTORY, .residuals = RESIDUES, .codes = 2U * SIGNALS};
-}
-
-/* Parts in any state that samples can leave, each with memory of its own: what runs over the end of one is outside. */
-static hg_hold *started_holds(const hg_detector_config *config)
-{
-    hg_hold *hold = any_array(hg_hold, GROUPS);
+    const hg_real *generator = &real[OWN_REALS + HOLD_REALS + RADII_REALS];
+    const hg_real *predictor = &generator[GENERATOR_REALS];
+    bool fits = (self->value == real) && (self->r == &real[ALL]) && (self->J == &real[ALL + RESIDUES]) && (self->past == &real[ALL + (2U * RESIDUES)]) &&
+                (self->radii.data == &real[OWN_REALS + HOLD_REALS]);
     for (uint8_t i = 0U; i < GROUPS; i++) {
-        hold[i] = (hg_hold){.config = &config->hold[i], .sent = any_array(int32_t, WIDTH), .previous = any_array(int32_t, WIDTH), .value = any_array(hg_real, WIDTH),
-                            .promise = any_array(hg_real, WIDTH), .age = any_u8(), .good = any_u8(), .level = any_u8(), .silence = any_u8(), .holes = any_bool(), .seen = any_bool(),
-                            .recovering = any_bool(), .fresh = any_bool(), .lost = any_bool(), .doubt = any_bool(), .gap = any_bool(), .gap_age = any_u8()};
-        assume(state_hold(&hold[i]));
-    }
-    return hold;
-}
-
-static hg_detector_memory started_parts(const hg_detector_config *config)
-{
-    hg_detector_memory part = {.hold = started_holds(config), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
-                               .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
-                               .alarm = any_array(hg_alarm, JUDGES)};
-    for (uint8_t i = 0U; i < PREDICTORS; i++) {
-        part.predict[i] = (hg_predict){.config = &config->predict[i], .x = any_array(hg_real, 1U), .next = any_array(hg_real, 1U), .u = any_array(hg_real, 1U), .y = any_array(hg_real, WIDTH),
-                                       .k = any_u16(), .sure = any_bool()};
+        fits = fits && (self->memory.hold[i].value == &real[OWN_REALS + HG_HOLD_REALS(i * WIDTH)]) && (self->memory.hold[i].sent == &self->memory.code[HG_HOLD_CODES(i * WIDTH)]);
     }
     for (uint8_t g = 0U; g < GENERATORS; g++) {
-        hg_real size;
-        part.residual[g] = (hg_residual){.config = &config->residual[g], .z = any_array(hg_real, 1U), .next = any_array(hg_real, 1U), .input = any_array(hg_real, 1U)};
-#if COLUMNS == 0U
-        part.hull[g] = (hg_hull){.config = &config->hull[g], .theta = any_array(hg_real, RESIDUALS), .mode = NULL, .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
-        (void)size;
-#else
-        part.zonotope[g] = (hg_zonotope){.config = &config->zonotope[g], .column = any_array(hg_real, COLUMNS + 2U), .score = any_array(hg_real, COLUMNS + 2U), .spread = any_array(hg_real, 1U),
-                                         .scratch = any_array(hg_real, 1U), .size = size, .count = any_u16(), .lost = any_u16(), .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
-        assume(part.zonotope[g].count <= COLUMNS);
-#endif
+        const hg_real *own = &generator[g * (HG_RESIDUAL_REALS(1U, 1U) + THRESHOLD_REALS)];
+        const hg_real *threshold = (COLUMNS == 0U) ? self->memory.hull[g].theta : self->memory.zonotope[g].column;
+        fits = fits && (self->memory.residual[g].z == own) && (threshold == &own[HG_RESIDUAL_REALS(1U, 1U)]);
     }
-    for (uint8_t b = 0U; b < BANKS; b++) {
-        part.bank[b] = (hg_bank){.config = &config->bank[b], .sum = any_array(hg_acc, 2U), .k = any_u8(), .closest = 0U};
+    for (uint8_t i = 0U; i < PREDICTORS; i++) {
+        fits = fits && (self->memory.predict[i].x == &predictor[i * HG_PREDICT_REALS(1U, 1U, WIDTH)]);
     }
-    for (uint8_t g = 0U; g < JUDGES; g++) {
-        part.alarm[g] = (hg_alarm){.state = (hg_plant)any_u8_in(HG_PLANT_NONE, HG_PLANT_CONFIRMED), .up = any_u8(), .down = any_u8(), .pending = any_u8()};
-    }
-    return part;
+    return fits && ((BANKS == 0U) || (self->values.data == &predictor[PREDICTOR_REALS]));
 }
 
-static hg_detector any_detector(const hg_detector_config *config)
+/** What starts is a detector that samples can leave: its tables are as its steps need them, its parts have the memory that they need, one after another and none twice. Null pointers,
+ *  too little memory and tables that contradict one another are refused.
+ *  GROUPS groups of WIDTH signals, PREDICTORS of them predicted, STATES uncertain states, GENERATORS generators of RESIDUALS residuals by hulls, or by zonotopes of COLUMNS columns,
+ *  BANKS banks, HISTORY rows; tables of any content.
+ *  @proves hg_detector_start hg_detector_reals hg_detector_sums
+ *  @without conversion: bits of groups are cut on purpose
+ *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=3U HORIZON=2U COLUMNS=1U ANY_NUMBERS ANY_SUMS */
+void proof_detector_start(void)
 {
-    hg_detector self = {.config = config, .memory = started_parts(config), .radii = {.data = any_array(hg_real, HISTORY * ALL), .width = ALL, .length = HISTORY, .newest = any_u8()},
-                        .values = {.data = any_array(hg_real, HISTORY * SIGNALS), .width = SIGNALS, .length = HISTORY, .newest = any_u8()},
-                        .value = any_array(hg_real, ALL), .r = any_array(hg_real, RESIDUES), .J = any_array(hg_real, RESIDUES), .past = any_array(hg_real, ALL), .refusals = any_u32(),
-                        .samples = any_u8(), .beginnings = any_u32()};
-    self.radius = self.radii.data;
-    self.decision = (hg_decision){.config = &config->decision, .alarm = self.memory.alarm, .left = any_u32()};
-    assume(state_detector(&self));
-    return self;
+    const hg_detector_config config = any_detector_config();
+    hg_real *real = any_array(hg_real, REALS);
+    hg_detector_memory memory = {.hold = any_array(hg_hold, GROUPS), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
+                                 .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
+                                 .alarm = any_array(hg_alarm, JUDGES), .code = any_array(int32_t, 2U * SIGNALS), .codes = 2U * SIGNALS, .real = real, .reals = REALS,
+                                 .sum = any_array(hg_acc, PLACES(2U * BANKS)), .sums = 2U * BANKS};
+    const hg_start how = any_bool() ? HG_START_REST : HG_START_MOVING;
+    hg_detector self;
+    prove((hg_detector_reals(&config) == REALS) && (hg_detector_sums(&config) == (2U * BANKS)), "what it needs");
+    prove((hg_detector_start(NULL, &config, &memory, how) == HG_E_ARGUMENT) && (hg_detector_start(&self, NULL, &memory, how) == HG_E_ARGUMENT) &&
+              (hg_detector_start(&self, &config, NULL, how) == HG_E_ARGUMENT),
+          "null pointers");
+    memory.reals = REALS - 1U;
+    const hg_status less = hg_detector_start(&self, &config, &memory, how);
+    prove((less == HG_E_SIZE) || (less == HG_E_CONFIG), "too little memory");
+    memory.reals = REALS;
+    assume(requires_detector_start(&self, &config, &memory));
+    const hg_status status = hg_detector_start(&self, &config, &memory, how);
+    prove((status == HG_OK) || (status == HG_E_CONFIG), "no other status");
+    prove(ensures_detector_start(&self, &config, &memory, status), "as given");
+    if (status == HG_OK) {
+        prove(started_detector(&self), "tables and memory as a step needs them");
+        prove(in_order(&self, real), "no number twice");
+        for (uint8_t g = 0U; g < JUDGES; g++) {
+            prove(self.memory.alarm[g].state == HG_PLANT_NONE, "no alarm");
+        }
+        reach("a start");
+    } else {
+        reach("a refusal");
+    }
 }
 
 /** A step asks of its parts what they were proven to do and no more: no undefined behaviour, a finding that there is, no past rewritten that is not kept; a detector is again
@@ -174,22 +88,18 @@ static hg_detector any_detector(const hg_detector_config *config)
  *  @stub hg_hold_step hg_hold_past hg_hold_rewrite hg_predict_step hg_mismatch_step hg_mismatch_grow hg_residual_step hg_hull_reset hg_hull_step
  *  @stub hg_zonotope_reset hg_zonotope_widen hg_zonotope_step hg_bank_reset hg_bank_step
  *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
- *  @run check real=f32 unwind=5 limit=150 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=2U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=3U COLUMNS=1U ANY_NUMBERS */
+ *  @run check real=f32 unwind=5 limit=150 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=3U HORIZON=3U COLUMNS=1U ANY_NUMBERS */
 void proof_detector_step(void)
 {
-    const hg_detector_config config = any_config();
-    assume(valid_signals(&config) && valid_judges(&config));
+    const hg_detector_config config = any_detector_config();
     hg_detector self = any_detector(&config);
+    const hg_detector before = self;
     hg_finding finding;
     const hg_status status = hg_detector_step(&self, &finding);
-    prove((status == HG_OK) || (status == HG_E_NUMERIC), "no other status");
-    prove((finding.plant <= HG_PLANT_CONFIRMED) && (finding.basis != HG_BASIS_UNSET), "a finding that there is");
-    prove(state_detector(&self), "a state that samples can leave");
-    for (uint8_t i = 0U; i < GROUPS; i++) {
-        prove(state_hold(&self.memory.hold[i]), "and its holds'");
-    }
+    prove(ensures_detector_step(&self, &before, &finding, status), "a finding that there is");
+    prove(started_detector(&self), "a state that samples can leave");
     if (finding.plant == HG_PLANT_CONFIRMED) {
         reach("an alarm");
     }
@@ -204,16 +114,17 @@ void proof_detector_step(void)
  *  @proves hg_detector_receive hg_detector_lose hg_detector_restart
  *  @stub hg_hold_receive hg_predict_reset hg_residual_reset hg_hull_reset hg_zonotope_reset hg_bank_reset
  *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
- *  @run check real=f32 unwind=7 limit=90 hg_ring_reset.0:13 GROUPS=2U WIDTH=2U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=1U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=7 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U COLUMNS=1U ANY_NUMBERS */
+ *  @run check real=f32 unwind=7 limit=90 hg_ring_reset.0:13 GROUPS=2U WIDTH=2U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=1U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=7 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=1U ANY_NUMBERS */
 void proof_detector_receive(void)
 {
-    const hg_detector_config config = any_config();
-    assume(valid_signals(&config) && valid_judges(&config));
+    const hg_detector_config config = any_detector_config();
     hg_detector self = any_detector(&config);
+    const hg_detector before = self;
     const uint8_t group = any_u8();
     int32_t code[WIDTH];
     if (any_bool()) {
+        assume(requires_detector_receive(&self, group, code));
         const hg_status status = hg_detector_receive(&self, group, code, any_bool());
         prove(ensures_detector_receive(&self, group, status), "a status of the list");
         prove((status != HG_E_NUMERIC) || self.memory.hold[group].lost, "a refused one is lost");
@@ -223,11 +134,8 @@ void proof_detector_receive(void)
     }
     prove((hg_detector_lose(&self, group) == HG_OK) == (group < GROUPS), "noted of a group that there is");
     prove((group >= GROUPS) || self.memory.hold[group].lost, "lost");
-    const uint32_t beginnings = self.beginnings;
     hg_detector_restart(&self, any_bool() ? HG_START_REST : HG_START_MOVING);
-    prove((self.samples == 0U) && (self.beginnings == (uint32_t)(beginnings + 1U)) && state_detector(&self), "begun again");
-    for (uint8_t i = 0U; i < GROUPS; i++) {
-        prove(state_hold(&self.memory.hold[i]), "its holds are as they were");
-    }
+    prove(ensures_detector_restart(&self, &before), "begun again");
+    prove(started_detector(&self), "a state that samples can leave");
     reach("end");
 }

@@ -1,8 +1,6 @@
 /** @file
  *  frame.h: codes to bytes and back. */
-#include "proof.h"
-
-#include "hullguard/frame.h"
+#include "contract.h"
 
 static hg_code_scale any_scale(void)
 {
@@ -85,7 +83,7 @@ void proof_frame_layout(void)
 
 /** A frame of any bytes is read without overrun, and every code that comes out is valid or stands for no value; when one is neither, nothing is written.
  *  Any valid message of WIDTH fields, float32 fields among them, in a frame of up to LENGTH bytes; any bytes.
- *  @proves hg_frame_unpack hg_frame_valid
+ *  @proves hg_frame_unpack hg_frame_matches hg_frame_valid
  *  @without conversion: the bytes of a pattern are cut to 8 bits on purpose
  *  @run check real=f32 unwind=33 limit=150 LENGTH=4U WIDTH=1U
  *  @run check real=q31 unwind=33 limit=150 LENGTH=3U WIDTH=1U
@@ -100,8 +98,11 @@ void proof_frame_unpack(void)
     hg_can_frame frame;
     int32_t code[WIDTH];
     const int32_t before = code[0];
+    assume(requires_frame_matches(&message, &frame));
+    prove(ensures_frame_matches(&message, &frame, hg_frame_matches(&message, &frame)), "its identifier and length");
+    assume(requires_frame_unpack(&message, &frame, code));
     const hg_status status = hg_frame_unpack(&message, &frame, code);
-    prove((status == HG_OK) || (status == HG_E_FORMAT) || (status == HG_E_NUMERIC), "no other status");
+    prove(ensures_frame_unpack(status), "no other status");
     for (uint8_t g = 0U; g < WIDTH; g++) {
         prove((status != HG_OK) || (code[g] == HG_CODE_INVALID) || hg_code_valid(&scale[g], code[g]), "a code, or none");
     }

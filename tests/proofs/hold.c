@@ -157,8 +157,11 @@ void proof_hold_step(void)
     prove((hg_hold_start(NULL, &config, codes, reals) == HG_E_ARGUMENT) && (hg_hold_start(&self, NULL, codes, reals) == HG_E_ARGUMENT) &&
               (hg_hold_start(&self, &config, NULL, reals) == HG_E_ARGUMENT) && (hg_hold_start(&self, &config, codes, NULL) == HG_E_ARGUMENT),
           "null pointers");
+    any_state(&self);
+    const hg_hold other = self;
+    assume(requires_hold_start(&config, codes, reals));
     const hg_status started = hg_hold_start(&self, &config, codes, reals);
-    prove((started == HG_OK) || (started == HG_E_CONFIG), "no other status");
+    prove(ensures_hold_start(&self, &other, &config, codes, reals, started), "begun, or refused for its tables");
     if (started != HG_OK) {
         return;
     }

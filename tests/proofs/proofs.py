@@ -204,12 +204,12 @@ def proofs_in(source: Path) -> list[Proof]:
 
 
 def check_stubs(proofs: Sequence[Proof]) -> None:
-    """What a stub asserts and assumes stands in a proof of the function that it replaces, the other way round: both call the same requires_ and ensures_ of contract.h."""
+    """What a stub asserts and assumes stands in a proof of the function that it replaces, the other way round: both call the same requires_, ensures_ and started_ of contract.h."""
     names = names_in(parse(HERE / "stubs.h").root_node)
     for name in sorted({f for p in proofs for f in p.stubs}):
         if f"stub_{name}" not in names:
             raise ProofError(f"{name}() has no stub_{name}() in tests/proofs/stubs.h")
-        contract = {n for n in reached_from(f"stub_{name}", names) if n.startswith(("requires_", "ensures_"))}
+        contract = {n for n in reached_from(f"stub_{name}", names) if n.startswith(("requires_", "ensures_", "started_"))}
         proven = [p for p in proofs if name in p.proves]
         if not contract or not proven:
             raise ProofError(f"the stub of {name}() rests on nothing: it wants a contract, and a proof of the function")

@@ -42,6 +42,24 @@ static void write_hold(hg_hold *self)
     write_reals(self->promise, width);
 }
 
+hg_status stub_hg_hold_start(hg_hold *self, const hg_hold_config *config, int32_t *codes, hg_real *reals)
+{
+    prove(requires_hold_start(config, codes, reals), "contract of hg_hold_start()");
+    const hg_hold before = *self;
+    const hg_status status = any_bool() ? HG_OK : HG_E_CONFIG;
+    if (status == HG_OK) {
+        const uint8_t width = config->trigger->width;
+        self->config = config;
+        self->sent = codes;
+        self->previous = &codes[width];
+        self->value = reals;
+        self->promise = &reals[width];
+        write_hold(self);
+    }
+    assume(ensures_hold_start(self, &before, config, codes, reals, status));
+    return status;
+}
+
 hg_status stub_hg_hold_receive(hg_hold *self, const int32_t *code, bool continues)
 {
     prove(requires_hold_receive(self, code), "contract of hg_hold_receive()");
@@ -182,14 +200,15 @@ static void write_zonotope(hg_zonotope *self)
     write_reals(self->score, most);
     write_reals(self->spread, config->order);
     write_reals(self->scratch, config->order);
-    assume(ensures_zonotope(self, &before));
 }
 
 void stub_hg_zonotope_reset(hg_zonotope *self, hg_start how)
 {
     prove(requires_zonotope_reset(self), "contract of hg_zonotope_reset()");
     (void)how;
+    const hg_zonotope before = *self;
     write_zonotope(self);
+    assume(ensures_zonotope(self, &before));
 }
 
 void stub_hg_zonotope_widen(hg_zonotope *self, uint8_t lag, uint8_t first, uint8_t count, const hg_real *increase)
@@ -197,14 +216,18 @@ void stub_hg_zonotope_widen(hg_zonotope *self, uint8_t lag, uint8_t first, uint8
     prove(requires_zonotope_widen(self, count, increase), "contract of hg_zonotope_widen()");
     (void)lag;
     (void)first;
+    const hg_zonotope before = *self;
     write_zonotope(self);
+    assume(ensures_zonotope(self, &before));
 }
 
 void stub_hg_zonotope_step(hg_zonotope *self, const hg_ring *ring, hg_real *J)
 {
     prove(requires_zonotope_step(self, ring, J), "contract of hg_zonotope_step()");
+    const hg_zonotope before = *self;
     write_zonotope(self);
     write_reals(J, self->config->residuals);
+    assume(ensures_zonotope(self, &before));
 }
 #endif
 
@@ -234,6 +257,123 @@ hg_status stub_hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *
     write_reals(r, 1U);
     write_reals(J, 1U);
     assume(ensures_bank_step(self, &before, status));
+    return status;
+}
+
+/* ---- detector.h ---- */
+
+/* Anything but what it is made of: counts, rows and states of its parts, and all numbers of the last sample. */
+static void write_detector(hg_detector *self)
+{
+    const hg_detector_config *config = self->config;
+    const hg_detector_memory *part = &self->memory;
+    self->radii.newest = any_u8_in(0U, (uint8_t)(self->radii.length - 1U));
+    self->values.newest = any_u8();
+    self->decision.left = any_u32();
+    self->refusals = any_u32();
+    self->samples = any_u8();
+    self->beginnings = any_u32();
+    write_reals(self->value, config->width);
+    write_reals(self->r, config->residuals);
+    write_reals(self->J, config->residuals);
+    write_reals(self->past, config->width);
+    write_reals(self->radii.data, HG_RING_REALS(config->width, config->history));
+    for (uint8_t i = 0U; i < config->groups; i++) {
+        write_hold(&part->hold[i]);
+    }
+    for (uint8_t i = 0U; i < config->predictors; i++) {
+        part->predict[i].k = any_u16();
+        part->predict[i].sure = any_bool();
+    }
+    for (uint8_t g = 0U; g < config->generators; g++) {
+        if (config->hull != NULL) {
+            write_hull(&part->hull[g]);
+        }
+#if HG_WITH_ZONOTOPE
+        if (config->hull == NULL) {
+            write_zonotope(&part->zonotope[g]);
+        }
+#endif
+    }
+    for (uint8_t b = 0U; b < config->banks; b++) {
+        write_bank(&part->bank[b]);
+    }
+    for (uint8_t g = 0U; g < config->decision.generators; g++) {
+        part->alarm[g] = (hg_alarm){.state = (hg_plant)any_u8(), .up = any_u8(), .down = any_u8(), .pending = any_u8()};
+    }
+}
+
+/* Memory and parts as they were given; what they are of is config's. */
+hg_status stub_hg_detector_start(hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory, hg_start how)
+{
+    prove(requires_detector_start(self, config, memory), "contract of hg_detector_start()");
+    (void)how;
+    const hg_status status = any_status();
+    *self = (hg_detector){.config = config, .memory = *memory};
+    assume(ensures_detector_start(self, config, memory, status));
+    return status;
+}
+
+hg_status stub_hg_detector_receive(hg_detector *self, uint8_t group, const int32_t *code, bool continues)
+{
+    prove(requires_detector_receive(self, group, code), "contract of hg_detector_receive()");
+    (void)continues;
+    const hg_status status = any_status();
+    if (group < self->config->groups) {
+        const hg_hold before = self->memory.hold[group];
+        write_hold(&self->memory.hold[group]);
+        assume(kept_hold(&self->memory.hold[group], &before));
+    }
+    assume(ensures_detector_receive(self, group, status));
+    return status;
+}
+
+void stub_hg_detector_restart(hg_detector *self, hg_start how)
+{
+    prove(started_detector(self), "contract of hg_detector_restart()");
+    (void)how;
+    const hg_detector before = *self;
+    write_detector(self);
+    assume(ensures_detector_restart(self, &before) && started_detector(self));
+}
+
+hg_status stub_hg_detector_step(hg_detector *self, hg_finding *finding)
+{
+    prove(started_detector(self), "contract of hg_detector_step()");
+    const hg_detector before = *self;
+    const hg_status status = any_status();
+    write_detector(self);
+    self->radius = &self->radii.data[(uint16_t)self->radii.newest * self->radii.width];
+    *finding = (hg_finding){.plant = (hg_plant)any_u8(), .basis = (hg_basis)any_u8(), .candidates = any_u32()};
+    assume(ensures_detector_step(self, &before, finding, status) && started_detector(self));
+    return status;
+}
+
+/* ---- e2e.h, frame.h ---- */
+
+hg_status stub_hg_e2e_check(const hg_e2e_config *config, const uint8_t *data, uint8_t length, hg_e2e_header *header)
+{
+    prove(requires_e2e_check(config, data, length, header), "contract of hg_e2e_check()");
+    const hg_status status = any_status();
+    *header = (hg_e2e_header){.stamp = any_u8(), .counter = any_u8(), .crc = any_u16()};
+    assume(ensures_e2e_check(config, header, status));
+    return status;
+}
+
+bool stub_hg_frame_matches(const hg_message *message, const hg_can_frame *frame)
+{
+    prove(requires_frame_matches(message, frame), "contract of hg_frame_matches()");
+    const bool matches = any_bool();
+    assume(ensures_frame_matches(message, frame, matches));
+    return matches;
+}
+
+hg_status stub_hg_frame_unpack(const hg_message *message, const hg_can_frame *frame, int32_t *code)
+{
+    prove(requires_frame_unpack(message, frame, code), "contract of hg_frame_unpack()");
+    const hg_status status = any_status();
+    write_codes(code, message->width);
+    assume(ensures_frame_unpack(status));
     return status;
 }
 

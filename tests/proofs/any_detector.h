@@ -1,0 +1,174 @@
+/** @file
+ *  A detector of small sizes, tables and state of any content: GROUPS groups of WIDTH signals, PREDICTORS of them predicted, STATES uncertain states, GENERATORS generators of RESIDUALS
+ *  residuals by hulls (COLUMNS 0) or by zonotopes of COLUMNS columns, BANKS banks, HISTORY rows. Every array is an object of its own. */
+#ifndef HULLGUARD_ANY_DETECTOR_H
+#define HULLGUARD_ANY_DETECTOR_H
+
+#include "stubs.h"
+
+#define SIGNALS (GROUPS * WIDTH)
+#define DERIVED ((PREDICTORS * WIDTH) + STATES)
+#define ALL (SIGNALS + DERIVED)
+#define JUDGES (GENERATORS + BANKS)
+#define RESIDUES ((GENERATORS * RESIDUALS) + BANKS)
+/* No array has no place. */
+#define PLACES(n) (((n) > 0U) ? (n) : 1U)
+
+/* Tables of any content for these sizes. */
+static hg_matrix any_matrix(uint8_t rows, uint8_t cols)
+{
+    return (hg_matrix){.rows = rows, .cols = cols, .exponent = 0, .data = any_array(hg_real, (size_t)rows * cols)};
+}
+
+static hg_hold_config *any_holds(void)
+{
+    hg_hold_config *hold = any_array(hg_hold_config, GROUPS);
+    for (uint8_t i = 0U; i < GROUPS; i++) {
+        hg_trigger_config *trigger = any_array(hg_trigger_config, 1U);
+        *trigger = (hg_trigger_config){.width = WIDTH, .levels = 1U, .interval_max = any_u8_in(1U, HORIZON), .silence = any_array(uint8_t, 1U),
+                                        .delta = any_array(uint16_t, WIDTH), .sigma = any_array(int32_t, WIDTH), .activity = any_array(int32_t, WIDTH), .zero = any_array(int32_t, WIDTH)};
+        hold[i] = (hg_hold_config){.trigger = trigger, .margin = (uint8_t)(HORIZON - trigger->interval_max), .scale = any_array(hg_code_scale, WIDTH), .half = any_array(hg_real, WIDTH),
+                                   .slew = any_array(hg_real, HORIZON * WIDTH),
+                                   .span = any_array(hg_real, WIDTH), .middle = any_array(hg_real, WIDTH)};
+    }
+    return hold;
+}
+
+static hg_predict_config *any_predictors(void)
+{
+    hg_predict_config *predict = any_array(hg_predict_config, PLACES(PREDICTORS));
+    for (uint8_t i = 0U; i < PREDICTORS; i++) {
+        predict[i] = (hg_predict_config){.group = i, .first = (uint8_t)(i * WIDTH), .order = 1U, .width = WIDTH, .inputs = 1U, .input = any_array(uint8_t, 1U), .known = any_array(hg_real, 1U),
+                                         .correct = any_matrix(1U, WIDTH), .state = any_matrix(1U, 1U), .drive = any_matrix(1U, 1U), .output = any_matrix(WIDTH, 1U),
+                                         .direct = any_matrix(WIDTH, 1U), .fresh = any_array(hg_real, WIDTH), .horizon = any_u8(), .radius = any_array(hg_real, WIDTH), .settle = any_u16()};
+    }
+    return predict;
+}
+
+static const hg_mismatch_config *any_mismatch(void)
+{
+    hg_mismatch_config *mismatch = any_array(hg_mismatch_config, 1U);
+    *mismatch = (hg_mismatch_config){.states = STATES, .width = 1U, .exponent = 0, .signal = any_array(uint8_t, 1U), .constant = any_array(hg_real, PLACES(STATES)),
+                                     .gain = any_array(hg_real, PLACES(STATES))};
+    return (STATES > 0U) ? mismatch : NULL;
+}
+
+static hg_residual_config *any_residuals(void)
+{
+    hg_residual_config *residual = any_array(hg_residual_config, GENERATORS);
+    for (uint8_t g = 0U; g < GENERATORS; g++) {
+        residual[g] = (hg_residual_config){.order = 1U, .residuals = RESIDUALS, .width = 1U, .signal = any_array(uint8_t, 1U), .state = any_matrix(1U, 1U), .input = any_matrix(1U, 1U),
+                                           .output = any_matrix(RESIDUALS, 1U), .direct = any_matrix(RESIDUALS, 1U)};
+    }
+    return residual;
+}
+
+#if COLUMNS == 0U
+static hg_hull_config *any_hulls(void)
+{
+    hg_hull_config *hull = any_array(hg_hull_config, GENERATORS);
+    for (uint8_t g = 0U; g < GENERATORS; g++) {
+        hull[g] = (hg_hull_config){.residuals = RESIDUALS, .width = 1U, .exponent = 0, .signal = any_array(uint8_t, 1U), .taps = any_array(uint8_t, 1U), .weight = any_array(hg_real, RESIDUALS),
+                                   .settle = 1U, .rest = any_array(hg_real, RESIDUALS), .rest_left = any_array(hg_real, RESIDUALS), .moving = any_array(hg_real, RESIDUALS),
+                                   .moving_left = any_array(hg_real, RESIDUALS), .bias = any_array(hg_real, RESIDUALS), .ready_rest = any_u16(), .ready_moving = any_u16(),
+                                   .decay = any_array(hg_real, RESIDUALS), .modes = 0U};
+    }
+    return hull;
+}
+#define HULLS any_hulls()
+#define ZONOTOPES NULL
+#else
+static hg_zonotope_config *any_zonotopes(void)
+{
+    hg_zonotope_config *zonotope = any_array(hg_zonotope_config, GENERATORS);
+    for (uint8_t g = 0U; g < GENERATORS; g++) {
+        zonotope[g] = (hg_zonotope_config){.order = 1U, .residuals = RESIDUALS, .width = 1U, .disturbances = 1U, .initial = 0U, .columns = COLUMNS, .blocks = 1U,
+                                           .reduction = HG_REDUCTION_BALL, .signal = any_array(uint8_t, 1U), .block = any_array(uint8_t, 1U), .state = any_array(hg_real, 1U),
+                                           .input = any_array(hg_real, 1U), .disturbance = any_array(hg_real, 1U), .output = any_array(hg_real, RESIDUALS),
+                                           .outer = any_array(hg_real, RESIDUALS), .direct = any_array(hg_real, RESIDUALS), .settle = 1U, .bias_rest = any_array(hg_real, RESIDUALS),
+                                           .bias_moving = any_array(hg_real, RESIDUALS), .decay = any_array(hg_real, 1U), .always = any_array(hg_real, 1U),
+                                           .growth = any_array(hg_real, 1U), .output_growth = any_array(hg_real, RESIDUALS), .recover = any_u16(), .ready_rest = any_u16(),
+                                           .ready_moving = any_u16()};
+    }
+    return zonotope;
+}
+#define HULLS NULL
+#define ZONOTOPES any_zonotopes()
+#endif
+
+static hg_bank_config *any_banks(void)
+{
+    hg_bank_config *bank = any_array(hg_bank_config, PLACES(BANKS));
+    for (uint8_t b = 0U; b < BANKS; b++) {
+        hg_real widen;
+        bank[b] = (hg_bank_config){.certificates = 1U, .window = any_u8(), .width = 1U, .signal = any_array(uint8_t, 1U), .exponent = 0, .weight = any_array(hg_real, HISTORY), .extras = 0U,
+                                   .bias = any_array(hg_real, 1U), .widen = widen};
+    }
+    return bank;
+}
+
+static hg_detector_config any_detector_config(void)
+{
+    return (hg_detector_config){
+        .signals = SIGNALS, .width = ALL, .groups = GROUPS, .hold = any_holds(), .predictors = PREDICTORS, .predict = any_predictors(), .mismatch = any_mismatch(), .generators = GENERATORS,
+        .residual = any_residuals(), .hull = HULLS, .zonotope = ZONOTOPES, .banks = BANKS, .bank = any_banks(), .polynomials = 0U, .polynomial = NULL,
+        .decision = {.generators = JUDGES, .feeds = any_array(uint8_t, JUDGES), .faults = any_array(uint32_t, JUDGES), .up = any_u8_in(1U, UINT8_MAX), .down = any_u8_in(1U, UINT8_MAX),
+                     .latch = any_bool()},
+        .history = HISTORY, .window = HISTORY, .residuals = RESIDUES, .codes = 2U * SIGNALS};
+}
+
+/* Parts in any state that samples can leave, each with memory of its own: what runs over the end of one is outside. */
+static hg_hold *started_holds(const hg_detector_config *config)
+{
+    hg_hold *hold = any_array(hg_hold, GROUPS);
+    for (uint8_t i = 0U; i < GROUPS; i++) {
+        int32_t *code = any_array(int32_t, 2U * WIDTH);
+        hg_real *real = any_array(hg_real, 2U * WIDTH);
+        hold[i] = (hg_hold){.config = &config->hold[i], .sent = code, .previous = &code[WIDTH], .value = real, .promise = &real[WIDTH], .age = any_u8(), .good = any_u8(), .level = any_u8(), .silence = any_u8(), .holes = any_bool(), .seen = any_bool(),
+                            .recovering = any_bool(), .fresh = any_bool(), .lost = any_bool(), .doubt = any_bool(), .gap = any_bool(), .gap_age = any_u8()};
+    }
+    return hold;
+}
+
+static hg_detector_memory started_parts(const hg_detector_config *config)
+{
+    hg_detector_memory part = {.hold = started_holds(config), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
+                               .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
+                               .alarm = any_array(hg_alarm, JUDGES)};
+    for (uint8_t i = 0U; i < PREDICTORS; i++) {
+        part.predict[i] = (hg_predict){.config = &config->predict[i], .x = any_array(hg_real, 1U), .next = any_array(hg_real, 1U), .u = any_array(hg_real, 1U), .y = any_array(hg_real, WIDTH),
+                                       .k = any_u16(), .sure = any_bool()};
+    }
+    for (uint8_t g = 0U; g < GENERATORS; g++) {
+        hg_real size;
+        part.residual[g] = (hg_residual){.config = &config->residual[g], .z = any_array(hg_real, 1U), .next = any_array(hg_real, 1U), .input = any_array(hg_real, 1U)};
+#if COLUMNS == 0U
+        part.hull[g] = (hg_hull){.config = &config->hull[g], .theta = any_array(hg_real, RESIDUALS), .mode = NULL, .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
+        (void)size;
+#else
+        part.zonotope[g] = (hg_zonotope){.config = &config->zonotope[g], .column = any_array(hg_real, COLUMNS + 2U), .score = any_array(hg_real, COLUMNS + 2U), .spread = any_array(hg_real, 1U),
+                                         .scratch = any_array(hg_real, 1U), .size = size, .count = any_u16(), .lost = any_u16(), .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
+#endif
+    }
+    for (uint8_t b = 0U; b < BANKS; b++) {
+        part.bank[b] = (hg_bank){.config = &config->bank[b], .sum = any_array(hg_acc, 2U), .k = any_u8(), .closest = 0U};
+    }
+    for (uint8_t g = 0U; g < JUDGES; g++) {
+        part.alarm[g] = (hg_alarm){.state = (hg_plant)any_u8_in(HG_PLANT_NONE, HG_PLANT_CONFIRMED), .up = any_u8(), .down = any_u8(), .pending = any_u8()};
+    }
+    return part;
+}
+
+static hg_detector any_detector(const hg_detector_config *config)
+{
+    hg_detector self = {.config = config, .memory = started_parts(config), .radii = {.data = any_array(hg_real, HISTORY * ALL), .width = ALL, .length = HISTORY, .newest = any_u8()},
+                        .values = {.data = any_array(hg_real, HISTORY * SIGNALS), .width = SIGNALS, .length = HISTORY, .newest = any_u8()},
+                        .value = any_array(hg_real, ALL), .r = any_array(hg_real, RESIDUES), .J = any_array(hg_real, RESIDUES), .past = any_array(hg_real, ALL), .refusals = any_u32(),
+                        .samples = any_u8(), .beginnings = any_u32()};
+    self.radius = self.radii.data;
+    self.decision = (hg_decision){.config = &config->decision, .alarm = self.memory.alarm, .left = any_u32()};
+    assume(started_detector(&self));
+    return self;
+}
+
+#endif
