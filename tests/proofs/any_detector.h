@@ -40,7 +40,7 @@ static hg_predict_config *any_predictors(void)
     for (uint8_t i = 0U; i < PREDICTORS; i++) {
         predict[i] = (hg_predict_config){.group = i, .first = (uint8_t)(i * WIDTH), .order = 1U, .width = WIDTH, .inputs = 1U, .input = any_array(uint8_t, 1U), .known = any_array(hg_real, 1U),
                                          .correct = any_matrix(1U, WIDTH), .state = any_matrix(1U, 1U), .drive = any_matrix(1U, 1U), .output = any_matrix(WIDTH, 1U),
-                                         .direct = any_matrix(WIDTH, 1U), .fresh = any_array(hg_real, WIDTH), .horizon = any_u8(), .radius = any_array(hg_real, WIDTH), .settle = any_u16()};
+                                         .direct = any_matrix(WIDTH, 1U), .fresh = any_array(hg_real, WIDTH), .horizon = 1U, .radius = any_array(hg_real, WIDTH), .settle = any_u16()};
     }
     return predict;
 }
@@ -68,7 +68,7 @@ static hg_hull_config *any_hulls(void)
 {
     hg_hull_config *hull = any_array(hg_hull_config, GENERATORS);
     for (uint8_t g = 0U; g < GENERATORS; g++) {
-        hull[g] = (hg_hull_config){.residuals = RESIDUALS, .width = 1U, .exponent = 0, .signal = any_array(uint8_t, 1U), .taps = any_array(uint8_t, 1U), .weight = any_array(hg_real, RESIDUALS),
+        hull[g] = (hg_hull_config){.residuals = RESIDUALS, .width = 1U, .exponent = 0, .signal = any_array(uint8_t, 1U), .taps = any_array(uint8_t, 1U), .weight = any_array(hg_real, RESIDUALS * HISTORY),
                                    .settle = 1U, .rest = any_array(hg_real, RESIDUALS), .rest_left = any_array(hg_real, RESIDUALS), .moving = any_array(hg_real, RESIDUALS),
                                    .moving_left = any_array(hg_real, RESIDUALS), .bias = any_array(hg_real, RESIDUALS), .ready_rest = any_u16(), .ready_moving = any_u16(),
                                    .decay = any_array(hg_real, RESIDUALS), .modes = 0U};
@@ -169,6 +169,29 @@ static hg_detector any_detector(const hg_detector_config *config)
     self.decision = (hg_decision){.config = &config->decision, .alarm = self.memory.alarm, .left = any_u32()};
     assume(started_detector(&self));
     return self;
+}
+
+#if COLUMNS == 0U
+#define THRESHOLD_REALS HG_HULL_REALS(RESIDUALS, 0U)
+#else
+#define THRESHOLD_REALS HG_ZONOTOPE_REALS(1U, COLUMNS, 2U)
+#endif
+/* Numbers of each part, in their order. */
+#define OWN_REALS ((2U * ALL) + (2U * RESIDUES))
+#define HOLD_REALS HG_HOLD_REALS(SIGNALS)
+#define RADII_REALS HG_RING_REALS(ALL, HISTORY)
+#define GENERATOR_REALS (GENERATORS * (HG_RESIDUAL_REALS(1U, 1U) + THRESHOLD_REALS))
+#define PREDICTOR_REALS (PREDICTORS * HG_PREDICT_REALS(1U, 1U, WIDTH))
+
+#define REALS (OWN_REALS + HOLD_REALS + RADII_REALS + GENERATOR_REALS + PREDICTOR_REALS + HG_RING_REALS(SIGNALS, HISTORY))
+
+/* Memory as a start asks for it. */
+static hg_detector_memory any_memory(void)
+{
+    return (hg_detector_memory){.hold = any_array(hg_hold, GROUPS), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
+                                .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
+                                .alarm = any_array(hg_alarm, JUDGES), .code = any_array(int32_t, 2U * SIGNALS), .codes = 2U * SIGNALS, .real = any_array(hg_real, REALS), .reals = REALS,
+                                .sum = any_array(hg_acc, PLACES(2U * BANKS)), .sums = 2U * BANKS};
 }
 
 #endif

@@ -11,6 +11,7 @@
 
 #include "proof.h"
 
+#include "hullguard/digest.h"
 #include "hullguard/node.h"
 
 #include <stdlib.h>
@@ -364,19 +365,6 @@ static inline bool started_detector(const hg_detector *self)
     return started;
 }
 
-static inline bool requires_detector_start(const hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory)
-{
-    return writable(self, 1U) && readable(config, 1U) && readable(memory, 1U);
-}
-
-static inline bool ensures_detector_start(const hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory, hg_status status)
-{
-    if (status != HG_OK) {
-        return (status == HG_E_ARGUMENT) || (status == HG_E_SIZE) || (status == HG_E_CONFIG);
-    }
-    return (self->config == config) && (self->memory.hold == memory->hold) && (self->memory.alarm == memory->alarm) && (self->refusals == 0U);
-}
-
 static inline bool requires_detector_receive(const hg_detector *self, uint8_t group, const int32_t *code)
 {
     return started_detector(self) && ((group >= self->config->groups) || readable(code, self->config->hold[group].trigger->width));
@@ -448,6 +436,111 @@ static inline bool state_node(const hg_node *self)
         in_range = in_range && writable(&self->link[i], 1U) && (self->link[i].receiver.counter < hg_e2e_modulus(config->message[i].e2e));
     }
     return in_range;
+}
+
+/* ---- crc32c.h, digest.h ---- */
+
+static inline bool requires_crc32c(uint8_t bytes)
+{
+    return bytes <= 4U;
+}
+
+/* A table that is there holds as many numbers as are taken. */
+#define requires_digest(x, count) (((x) == NULL) || readable((x), (count)))
+
+/* No number is taken twice, none is passed over twice, and no more are taken than there is room for. */
+static inline bool ensures_digest(const hg_digest *self, const hg_digest *before, bool there, uint32_t count)
+{
+    const uint32_t length = there ? count : 0U;
+    const uint32_t passed = before->skip - self->skip;
+    const uint32_t taken = before->left - self->left;
+    return (self->skip <= before->skip) && (self->left <= before->left) && (self->done == (uint32_t)(before->done + taken)) && (passed <= length) && (taken <= (length - passed)) &&
+           ((taken == 0U) || (self->skip == 0U)) && (((passed + taken) == length) || (self->left == 0U) || (self->skip > 0U));
+}
+
+/* ---- freeze.h ---- */
+
+static inline bool requires_freeze(const hg_freeze *self)
+{
+    const hg_freeze_config *config = self->config;
+    const hg_detector *detector = self->detector;
+    const uint32_t reals = HG_FREEZE_REALS(detector->config->width, detector->config->residuals);
+    return state_detector(detector) && (config->samples >= 1U) && (config->after < config->samples) && (config->burst >= 1U) && (self->held <= config->samples) &&
+           (self->newest < config->samples) && (self->state >= HG_FREEZE_RECORDING) && (self->state <= HG_FREEZE_FROZEN) && (self->rest <= config->after) &&
+           /* With the samples that are still to come a record holds that of its alarm. */
+           ((self->state == HG_FREEZE_RECORDING) || (((uint32_t)self->held + self->rest) > config->after)) && ((self->state != HG_FREEZE_FROZEN) || (self->rest == 0U)) && (self->missed <= 63U) && writable(self->memory.row, config->samples) && writable(self->memory.real, config->samples * reals);
+}
+
+static inline bool kept_freeze(const hg_freeze *self, const hg_freeze *before)
+{
+    return (self->config == before->config) && (self->detector == before->detector) && (self->memory.row == before->memory.row) && (self->memory.real == before->memory.real) &&
+           (self->model_hash == before->model_hash);
+}
+
+static inline bool ensures_freeze(const hg_freeze *self, const hg_freeze *before)
+{
+    return kept_freeze(self, before) && requires_freeze(self);
+}
+
+static inline bool requires_freeze_receive(const hg_freeze *self, const hg_can_frame *frame)
+{
+    return requires_freeze(self) && readable(frame, 1U);
+}
+
+static inline bool ensures_freeze_receive(const hg_freeze *self, const hg_freeze *before, hg_status status)
+{
+    return ensures_freeze(self, before) &&
+           ((status == HG_OK) || (status == HG_E_ID) || (status == HG_E_FORMAT) || (status == HG_E_CRC) || (status == HG_E_STATE) || (status == HG_E_NUMERIC));
+}
+
+static inline bool ensures_freeze_report(const hg_freeze *self, const hg_freeze *before, hg_status status)
+{
+    return ensures_freeze(self, before) && ((status == HG_OK) ? (self->credit == (before->credit - 1U)) : ((status == HG_E_EMPTY) && (self->credit == before->credit)));
+}
+
+/* ---- e2e.h: what is written ---- */
+
+static inline bool requires_e2e_protect(const hg_e2e_config *config, const uint8_t *data, uint8_t length)
+{
+    const bool listed = (config->profile == HG_E2E_P02) || (config->profile == HG_E2E_P22);
+    return (config->profile >= HG_E2E_NONE) && (config->profile <= HG_E2E_P22) && ((!listed) || readable(config->data_ids, HG_E2E_IDS)) && writable(data, length);
+}
+
+static inline bool ensures_e2e_protect(hg_status status)
+{
+    return (status == HG_OK) || (status == HG_E_FORMAT);
+}
+
+/* ---- frame.h: what is written; node.h: what a self-test calls ---- */
+
+static inline bool requires_frame_pack(const hg_message *message, const int32_t *code, const hg_can_frame *frame)
+{
+    return hg_frame_valid(message) && readable(code, message->width) && writable(frame, 1U);
+}
+
+static inline bool ensures_frame_pack(const hg_message *message, const hg_can_frame *frame)
+{
+    return (frame->id == message->id) && (frame->length == message->length);
+}
+
+static inline bool started_node(const hg_node *self)
+{
+    return state_node(self) && started_detector(&self->detector);
+}
+
+static inline bool ensures_node_receive(hg_status status)
+{
+    return (status == HG_OK) || (status == HG_E_ID) || (status == HG_E_FORMAT) || (status == HG_E_CRC) || (status == HG_E_REPEATED) || (status == HG_E_STAMP) ||
+           (status == HG_E_SEQUENCE) || (status == HG_E_STATE) || (status == HG_E_NUMERIC) || (status == HG_E_BUSY);
+}
+
+static inline bool ensures_node_step(const hg_node *self, const hg_node *before, const hg_verdict *verdict, hg_status status)
+{
+    if (status != HG_OK) {
+        return (status == HG_E_EMPTY) && (before->due == 0U);
+    }
+    return (self->due == (before->due - 1U)) && (verdict->k == before->k) && (self->k == (uint32_t)(before->k + 1U)) && (verdict->plant <= HG_PLANT_CONFIRMED) &&
+           ((verdict->basis == HG_BASIS_SET) || (verdict->basis == HG_BASIS_STATISTICAL)) && (verdict->model_hash == self->config->model_hash);
 }
 
 #endif

@@ -2,20 +2,6 @@
  *  detector.h: holds, derived signals, generators, banks and filters under one decision. Tables and numbers are any; sizes are those of a run. */
 #include "any_detector.h"
 
-#if COLUMNS == 0U
-#define THRESHOLD_REALS HG_HULL_REALS(RESIDUALS, 0U)
-#else
-#define THRESHOLD_REALS HG_ZONOTOPE_REALS(1U, COLUMNS, 2U)
-#endif
-/* Numbers of each part, in their order. */
-#define OWN_REALS ((2U * ALL) + (2U * RESIDUES))
-#define HOLD_REALS HG_HOLD_REALS(SIGNALS)
-#define RADII_REALS HG_RING_REALS(ALL, HISTORY)
-#define GENERATOR_REALS (GENERATORS * (HG_RESIDUAL_REALS(1U, 1U) + THRESHOLD_REALS))
-#define PREDICTOR_REALS (PREDICTORS * HG_PREDICT_REALS(1U, 1U, WIDTH))
-
-#define REALS (OWN_REALS + HOLD_REALS + RADII_REALS + GENERATOR_REALS + PREDICTOR_REALS + HG_RING_REALS(SIGNALS, HISTORY))
-
 /* What the parts were given of the detector's numbers: one after another, none twice. */
 static bool in_order(const hg_detector *self, const hg_real *real)
 {
@@ -49,11 +35,7 @@ static bool in_order(const hg_detector *self, const hg_real *real)
 void proof_detector_start(void)
 {
     const hg_detector_config config = any_detector_config();
-    hg_real *real = any_array(hg_real, REALS);
-    hg_detector_memory memory = {.hold = any_array(hg_hold, GROUPS), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
-                                 .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
-                                 .alarm = any_array(hg_alarm, JUDGES), .code = any_array(int32_t, 2U * SIGNALS), .codes = 2U * SIGNALS, .real = real, .reals = REALS,
-                                 .sum = any_array(hg_acc, PLACES(2U * BANKS)), .sums = 2U * BANKS};
+    hg_detector_memory memory = any_memory();
     const hg_start how = any_bool() ? HG_START_REST : HG_START_MOVING;
     hg_detector self;
     prove((hg_detector_reals(&config) == REALS) && (hg_detector_sums(&config) == (2U * BANKS)), "what it needs");
@@ -64,13 +46,11 @@ void proof_detector_start(void)
     const hg_status less = hg_detector_start(&self, &config, &memory, how);
     prove((less == HG_E_SIZE) || (less == HG_E_CONFIG), "too little memory");
     memory.reals = REALS;
-    assume(requires_detector_start(&self, &config, &memory));
     const hg_status status = hg_detector_start(&self, &config, &memory, how);
     prove((status == HG_OK) || (status == HG_E_CONFIG), "no other status");
-    prove(ensures_detector_start(&self, &config, &memory, status), "as given");
     if (status == HG_OK) {
         prove(started_detector(&self), "tables and memory as a step needs them");
-        prove(in_order(&self, real), "no number twice");
+        prove(in_order(&self, memory.real), "no number twice");
         for (uint8_t g = 0U; g < JUDGES; g++) {
             prove(self.memory.alarm[g].state == HG_PLANT_NONE, "no alarm");
         }

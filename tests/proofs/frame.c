@@ -35,7 +35,9 @@ void proof_frame_round(void)
     int32_t code = any_i32();
     const int32_t was = code;
     hg_can_frame frame;
+    assume(requires_frame_pack(&message, &code, &frame));
     hg_frame_pack(&message, &code, &frame);
+    prove(ensures_frame_pack(&message, &frame), "its identifier and length");
     prove(hg_frame_matches(&message, &frame), "of the message's kind");
     int32_t read;
     prove(hg_frame_unpack(&message, &frame, &read) == HG_OK, "what was packed can be read");

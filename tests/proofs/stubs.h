@@ -303,17 +303,6 @@ static void write_detector(hg_detector *self)
     }
 }
 
-/* Memory and parts as they were given; what they are of is config's. */
-hg_status stub_hg_detector_start(hg_detector *self, const hg_detector_config *config, const hg_detector_memory *memory, hg_start how)
-{
-    prove(requires_detector_start(self, config, memory), "contract of hg_detector_start()");
-    (void)how;
-    const hg_status status = any_status();
-    *self = (hg_detector){.config = config, .memory = *memory};
-    assume(ensures_detector_start(self, config, memory, status));
-    return status;
-}
-
 hg_status stub_hg_detector_receive(hg_detector *self, uint8_t group, const int32_t *code, bool continues)
 {
     prove(requires_detector_receive(self, group, code), "contract of hg_detector_receive()");
@@ -374,6 +363,182 @@ hg_status stub_hg_frame_unpack(const hg_message *message, const hg_can_frame *fr
     const hg_status status = any_status();
     write_codes(code, message->width);
     assume(ensures_frame_unpack(status));
+    return status;
+}
+
+/* ---- crc32c.h, digest.h ---- */
+
+/* Some function of all that it is given: what is proven with it holds of any checksum. */
+uint32_t __CPROVER_uninterpreted_checksum(uint32_t crc, uint32_t number, uint8_t bytes);
+
+uint32_t stub_hg_crc32c(uint32_t crc, uint32_t number, uint8_t bytes)
+{
+    prove(requires_crc32c(bytes), "contract of hg_crc32c()");
+    return __CPROVER_uninterpreted_checksum(crc, number, bytes);
+}
+
+static void write_digest(hg_digest *self)
+{
+    *self = (hg_digest){.crc = any_u32(), .done = any_u32(), .skip = any_u32(), .left = any_u32()};
+}
+
+void stub_hg_digest_bytes(hg_digest *self, const uint8_t *x, uint32_t count)
+{
+    prove(requires_digest(x, count), "contract of hg_digest_bytes()");
+    const hg_digest before = *self;
+    write_digest(self);
+    assume(ensures_digest(self, &before, x != NULL, count));
+}
+
+void stub_hg_digest_halves(hg_digest *self, const uint16_t *x, uint32_t count)
+{
+    prove(requires_digest(x, count), "contract of hg_digest_halves()");
+    const hg_digest before = *self;
+    write_digest(self);
+    assume(ensures_digest(self, &before, x != NULL, count));
+}
+
+void stub_hg_digest_codes(hg_digest *self, const int32_t *x, uint32_t count)
+{
+    prove(requires_digest(x, count), "contract of hg_digest_codes()");
+    const hg_digest before = *self;
+    write_digest(self);
+    assume(ensures_digest(self, &before, x != NULL, count));
+}
+
+void stub_hg_digest_masks(hg_digest *self, const uint32_t *x, uint32_t count)
+{
+    prove(requires_digest(x, count), "contract of hg_digest_masks()");
+    const hg_digest before = *self;
+    write_digest(self);
+    assume(ensures_digest(self, &before, x != NULL, count));
+}
+
+void stub_hg_digest_reals(hg_digest *self, const hg_real *x, uint32_t count)
+{
+    prove(requires_digest(x, count), "contract of hg_digest_reals()");
+    const hg_digest before = *self;
+    write_digest(self);
+    assume(ensures_digest(self, &before, x != NULL, count));
+}
+
+/* ---- freeze.h ---- */
+
+/* Anything but what it is made of. */
+static void write_freeze(hg_freeze *self)
+{
+    const hg_freeze before = *self;
+    const uint32_t reals = HG_FREEZE_REALS(self->detector->config->width, self->detector->config->residuals);
+    *self = (hg_freeze){.config = before.config, .detector = before.detector, .memory = before.memory, .model_hash = before.model_hash, .crc = any_u32(), .summed = any_u32(),
+                        .next = any_u32(), .end = any_u32(), .state = (hg_freeze_state)any_u8(), .newest = any_u8(), .held = any_u8(), .rest = any_u8(), .record = any_u8(),
+                        .missed = any_u8(), .credit = any_u8(), .counter = any_u8(), .stamp = any_u8(), .confirmed = any_bool(), .answer = any_bool(), .refused = any_u16()};
+    for (uint8_t i = 0U; i < self->config->samples; i++) {
+        hg_freeze_row row;
+        self->memory.row[i] = row;
+    }
+    write_reals(self->memory.real, self->config->samples * reals);
+}
+
+void stub_hg_freeze_step(hg_freeze *self, const hg_freeze_row *row)
+{
+    prove(requires_freeze(self) && readable(row, 1U), "contract of hg_freeze_step()");
+    const hg_freeze before = *self;
+    write_freeze(self);
+    assume(ensures_freeze(self, &before));
+}
+
+hg_status stub_hg_freeze_receive(hg_freeze *self, const hg_can_frame *frame)
+{
+    prove(requires_freeze_receive(self, frame), "contract of hg_freeze_receive()");
+    const hg_freeze before = *self;
+    const hg_status status = any_status();
+    write_freeze(self);
+    assume(ensures_freeze_receive(self, &before, status));
+    return status;
+}
+
+hg_status stub_hg_freeze_report(hg_freeze *self, hg_can_frame *frame)
+{
+    prove(requires_freeze(self) && writable(frame, 1U), "contract of hg_freeze_report()");
+    const hg_freeze before = *self;
+    const hg_status status = any_status();
+    hg_can_frame any;
+    *frame = any;
+    write_freeze(self);
+    assume(ensures_freeze_report(self, &before, status));
+    return status;
+}
+
+/* ---- e2e.h: what is written ---- */
+
+hg_status stub_hg_e2e_protect(const hg_e2e_config *config, uint8_t *data, uint8_t length, uint8_t counter, uint8_t stamp)
+{
+    prove(requires_e2e_protect(config, data, length), "contract of hg_e2e_protect()");
+    (void)counter;
+    (void)stamp;
+    const hg_status status = any_status();
+    for (uint8_t i = 0U; i < length; i++) {
+        data[i] = any_u8();
+    }
+    assume(ensures_e2e_protect(status));
+    return status;
+}
+
+/* ---- frame.h: what is written; node.h: what a self-test calls ---- */
+
+void stub_hg_frame_pack(const hg_message *message, const int32_t *code, hg_can_frame *frame)
+{
+    prove(requires_frame_pack(message, code, frame), "contract of hg_frame_pack()");
+    hg_can_frame any;
+    *frame = any;
+    assume(ensures_frame_pack(message, frame));
+}
+
+/* Anything but what it is made of; the numbers that wait for the closing frame, too. */
+static void write_node(hg_node *self)
+{
+    write_detector(&self->detector);
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        hg_link link;
+        link.timed = any_bool();
+        link.receiver.seen = any_bool();
+        self->link[i] = link;
+    }
+    write_codes(self->closing, self->config->message[self->config->closing].width);
+    self->k = any_u32();
+    self->unknown = any_u32();
+    self->overdue = any_u32();
+    self->due = any_u8();
+    self->held = any_bool();
+    self->continues = any_bool();
+    self->synchronised = any_bool();
+    self->slipped = any_bool();
+    self->slipped_counter = any_u8();
+    self->slipped_stamp = any_u8();
+    self->slipped_k = any_u32();
+    self->closed = any_bool();
+    self->closing_counter = any_u8();
+    self->closing_k = any_u32();
+}
+
+hg_status stub_hg_node_receive(hg_node *self, const hg_can_frame *frame)
+{
+    prove(started_node(self) && readable(frame, 1U), "contract of hg_node_receive()");
+    const hg_status status = any_status();
+    write_node(self);
+    assume(ensures_node_receive(status) && started_node(self));
+    return status;
+}
+
+hg_status stub_hg_node_step(hg_node *self, hg_verdict *verdict)
+{
+    prove(started_node(self) && writable(verdict, 1U), "contract of hg_node_step()");
+    const hg_node before = *self;
+    const hg_status status = any_status();
+    write_node(self);
+    *verdict = (hg_verdict){.k = any_u32(), .model_hash = any_u32(), .candidates = any_u32(), .plant = (hg_plant)any_u8(), .basis = (hg_basis)any_u8(), .bus = any_u16(),
+                            .refused = any_bool()};
+    assume(ensures_node_step(self, &before, verdict, status) && started_node(self));
     return status;
 }
 
