@@ -9,8 +9,13 @@
 #define SIGNALS (GROUPS * WIDTH)
 #define DERIVED ((PREDICTORS * WIDTH) + STATES)
 #define ALL (SIGNALS + DERIVED)
-#define JUDGES (GENERATORS + BANKS)
-#define RESIDUES ((GENERATORS * RESIDUALS) + BANKS)
+#ifndef POLYNOMIALS
+#define POLYNOMIALS 0U /* filters of one state, one output and degree 1 */
+#endif
+#define JUDGES (GENERATORS + BANKS + POLYNOMIALS)
+#define RESIDUES ((GENERATORS * RESIDUALS) + BANKS + (HG_STATISTICS * POLYNOMIALS))
+#define LIFTED_RING 4U /* C(2 + 1 + 1, 1) */
+#define STATISTIC_REALS (HG_POLYNOMIAL_REALS(1U, 1U, 1U, 1U, LIFTED_RING) + 2U)
 /* No array has no place. */
 #define PLACES(n) (((n) > 0U) ? (n) : 1U)
 
@@ -107,11 +112,34 @@ static hg_bank_config *any_banks(void)
     return bank;
 }
 
+static hg_statistic_config *any_statistics(void)
+{
+    hg_statistic_config *statistic = any_array(hg_statistic_config, PLACES(POLYNOMIALS));
+    for (uint8_t p = 0U; p < POLYNOMIALS; p++) {
+        uint16_t *end = any_array(uint16_t, 1U);
+        uint16_t *start = any_array(uint16_t, LIFTED_RING + 1U);
+        const hg_polynomial_map map = {.width = 1U, .end = end, .coefficient = any_array(hg_real, 1U), .factor = any_array(uint8_t, 1U)};
+        hg_real kappa;
+        hg_real joint;
+        hg_real weight;
+        hg_real drift;
+        assume((end[0] <= 1U) && (start[LIFTED_RING] <= 1U)); /* what they say of their lists' lengths */
+        statistic[p] = (hg_statistic_config){
+            .signal = any_array(uint8_t, 1U), .gain = any_array(hg_real, 1U), .inputs = 0U, .settle = any_u8(),
+            .filter = {.states = 1U, .outputs = 1U, .degree = 1U, .bounded = false, .lifted = 1U, .measured = 1U, .judged = 1U, .noises = 3U, .ring = LIFTED_RING, .lower = LIFTED_RING,
+                       .f = map, .h = map, .start = start, .product = any_array(uint16_t, 1U), .parent = any_array(uint8_t, 2U),
+                       .factor = any_array(uint8_t, 2U), .noise = any_array(uint8_t, LIFTED_RING), .moment = any_array(uint8_t, LIFTED_RING), .mean = any_array(hg_real, 3U),
+                       .covariance = any_array(hg_real, 9U), .x0 = any_array(hg_real, 1U), .P0 = any_array(hg_real, 1U), .M0 = any_array(hg_real, 4U), .Q = any_array(hg_real, 1U),
+                       .R = any_array(hg_real, 1U), .range = any_array(hg_real, 1U), .fresh = any_array(hg_real, 1U), .kappa = kappa, .joint = joint, .weight = weight, .drift = drift}};
+    }
+    return statistic;
+}
+
 static hg_detector_config any_detector_config(void)
 {
     return (hg_detector_config){
         .signals = SIGNALS, .width = ALL, .groups = GROUPS, .hold = any_holds(), .predictors = PREDICTORS, .predict = any_predictors(), .mismatch = any_mismatch(), .generators = GENERATORS,
-        .residual = any_residuals(), .hull = HULLS, .zonotope = ZONOTOPES, .banks = BANKS, .bank = any_banks(), .polynomials = 0U, .polynomial = NULL,
+        .residual = any_residuals(), .hull = HULLS, .zonotope = ZONOTOPES, .banks = BANKS, .bank = any_banks(), .polynomials = POLYNOMIALS, .polynomial = any_statistics(),
         .decision = {.generators = JUDGES, .feeds = any_array(uint8_t, JUDGES), .faults = any_array(uint32_t, JUDGES), .up = any_u8_in(1U, UINT8_MAX), .down = any_u8_in(1U, UINT8_MAX),
                      .latch = any_bool()},
         .history = HISTORY, .window = HISTORY, .residuals = RESIDUES, .codes = 2U * SIGNALS};
@@ -150,6 +178,12 @@ static hg_detector_memory started_parts(const hg_detector_config *config)
                                          .scratch = any_array(hg_real, 1U), .size = size, .count = any_u16(), .lost = any_u16(), .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
 #endif
     }
+    part.polynomial = any_array(hg_statistic, PLACES(POLYNOMIALS));
+    for (uint8_t p = 0U; p < POLYNOMIALS; p++) {
+        hg_statistic *statistic = &part.polynomial[p];
+        (void)hg_statistic_start(statistic, &config->polynomial[p], any_array(hg_real, STATISTIC_REALS));
+        statistic->samples = any_u8();
+    }
     for (uint8_t b = 0U; b < BANKS; b++) {
         part.bank[b] = (hg_bank){.config = &config->bank[b], .sum = any_array(hg_acc, 2U), .k = any_u8(), .closest = 0U};
     }
@@ -183,14 +217,14 @@ static hg_detector any_detector(const hg_detector_config *config)
 #define GENERATOR_REALS (GENERATORS * (HG_RESIDUAL_REALS(1U, 1U) + THRESHOLD_REALS))
 #define PREDICTOR_REALS (PREDICTORS * HG_PREDICT_REALS(1U, 1U, WIDTH))
 
-#define REALS (OWN_REALS + HOLD_REALS + RADII_REALS + GENERATOR_REALS + PREDICTOR_REALS + HG_RING_REALS(SIGNALS, HISTORY))
+#define REALS (OWN_REALS + HOLD_REALS + RADII_REALS + GENERATOR_REALS + PREDICTOR_REALS + (POLYNOMIALS * STATISTIC_REALS) + HG_RING_REALS(SIGNALS, HISTORY))
 
 /* Memory as a start asks for it. */
 static hg_detector_memory any_memory(void)
 {
     return (hg_detector_memory){.hold = any_array(hg_hold, GROUPS), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
                                 .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
-                                .alarm = any_array(hg_alarm, JUDGES), .code = any_array(int32_t, 2U * SIGNALS), .codes = 2U * SIGNALS, .real = any_array(hg_real, REALS), .reals = REALS,
+                                .polynomial = any_array(hg_statistic, PLACES(POLYNOMIALS)), .alarm = any_array(hg_alarm, JUDGES), .code = any_array(int32_t, 2U * SIGNALS), .codes = 2U * SIGNALS, .real = any_array(hg_real, REALS), .reals = REALS,
                                 .sum = any_array(hg_acc, PLACES(2U * BANKS)), .sums = 2U * BANKS};
 }
 

@@ -12,7 +12,7 @@
 #include "proof.h"
 
 #include "hullguard/digest.h"
-#include "hullguard/node.h"
+#include "hullguard/selftest.h"
 
 #include <stdlib.h>
 
@@ -270,6 +270,73 @@ static inline bool ensures_bank_step(const hg_bank *self, const hg_bank *before,
            ((status == HG_OK) || (status == HG_E_EMPTY) || (status == HG_E_NUMERIC));
 }
 
+/* ---- polynomial.h ---- */
+
+#if HG_WITH_POLYNOMIAL
+/* Every part has as many numbers as the tables say. */
+static inline bool started_polynomial(const hg_polynomial *self)
+{
+    const hg_polynomial_config *config = self->config;
+    const uint32_t n = config->states;
+    const uint32_t p = config->outputs;
+    const uint32_t wide = (uint32_t)config->lifted + 1U;
+    const uint32_t rows = (uint32_t)config->lifted + config->measured;
+    bool there = writable(self->x, n) && writable(self->Px, n * n) && writable(self->ekf, n) && writable(self->c, n) && writable(self->Pe, n * n) && writable(self->z, wide);
+    there = there && writable(self->P, HG_POLYNOMIAL_HALF(wide - 1U)) && writable(self->M, HG_POLYNOMIAL_HALF(wide)) && writable(self->mean, p) && writable(self->eta, p);
+    there = there && writable(self->radius, p) && writable(self->width, p) && writable(self->L, n * p) && writable(self->slack, rows) && writable(self->weigh, rows) &&
+            writable(self->next, wide);
+    return there && writable(self->root, (uint32_t)config->measured * config->measured) && writable(self->poly, rows * config->ring) && writable(self->shift, n * config->ring) &&
+           writable(self->term, config->ring);
+}
+
+static inline bool requires_polynomial_step(const hg_polynomial *self, const hg_real *y, const hg_real *radius)
+{
+    return hg_polynomial_valid(self->config) && started_polynomial(self) && readable(y, self->config->outputs) && readable(radius, self->config->outputs);
+}
+
+static inline bool ensures_polynomial_step(const hg_polynomial *self, const hg_polynomial *before, hg_status status)
+{
+    return ((status == HG_OK) || (status == HG_E_NUMERIC)) && (self->config == before->config) && (self->x == before->x) && (self->c == before->c) && (self->P == before->P) &&
+           (self->poly == before->poly) && (self->term == before->term);
+}
+static inline bool requires_polynomial_reset(const hg_polynomial *self)
+{
+    return hg_polynomial_valid(self->config) && started_polynomial(self);
+}
+
+/* ---- statistic.h ---- */
+
+static inline bool started_statistic(const hg_statistic *self)
+{
+    const hg_statistic_config *config = self->config;
+    return hg_statistic_valid(config, UINT8_MAX) && (self->filter.config == &config->filter) && started_polynomial(&self->filter) && writable(self->y, config->filter.outputs) &&
+           writable(self->radius, config->filter.outputs);
+}
+
+static inline bool requires_statistic_step(const hg_statistic *self, const hg_real *value, const hg_real *radius, const hg_real *r, const hg_real *J)
+{
+    const hg_statistic_config *config = self->config;
+    bool there = started_statistic(self) && writable(r, HG_STATISTICS) && writable(J, HG_STATISTICS);
+    for (uint8_t j = 0U; j < config->filter.outputs; j++) {
+        there = there && readable(&value[config->signal[j]], 1U) && readable(&radius[config->signal[j]], 1U);
+    }
+    for (uint8_t i = 0U; i < config->inputs; i++) {
+        there = there && readable(&value[config->input[i]], 1U) && readable(&radius[config->input[i]], 1U);
+    }
+    return there;
+}
+
+static inline bool ensures_statistic_reset(const hg_statistic *self, const hg_statistic *before)
+{
+    return (self->config == before->config) && (self->y == before->y) && (self->radius == before->radius) && (self->samples == 0U) && started_statistic(self);
+}
+
+static inline bool ensures_statistic_step(const hg_statistic *self, const hg_statistic *before, hg_status status)
+{
+    return ((status == HG_OK) || (status == HG_E_NUMERIC)) && (self->config == before->config) && (self->y == before->y) && (self->radius == before->radius) && started_statistic(self);
+}
+#endif
+
 /* ---- detector.h ---- */
 
 /* Places of group i's signals in the vector: from here on. */
@@ -321,6 +388,11 @@ static inline bool valid_judges(const hg_detector_config *config)
 #endif
         residuals += residual->residuals;
     }
+#if HG_WITH_POLYNOMIAL
+    for (uint8_t p = 0U; p < config->polynomials; p++) {
+        valid = valid && hg_statistic_valid(&config->polynomial[p], config->signals);
+    }
+#endif
     for (uint8_t b = 0U; b < config->banks; b++) {
         valid = valid && (config->bank[b].window <= config->history) && hg_bank_valid(&config->bank[b], config->signals, config->width, config->window);
     }
@@ -359,6 +431,11 @@ static inline bool started_detector(const hg_detector *self)
         }
 #endif
     }
+#if HG_WITH_POLYNOMIAL
+    for (uint8_t p = 0U; p < config->polynomials; p++) {
+        started = started && (part->polynomial[p].config == &config->polynomial[p]) && started_statistic(&part->polynomial[p]);
+    }
+#endif
     for (uint8_t b = 0U; b < config->banks; b++) {
         started = started && (part->bank[b].config == &config->bank[b]) && requires_bank_reset(&part->bank[b]);
     }
@@ -541,6 +618,26 @@ static inline bool ensures_node_step(const hg_node *self, const hg_node *before,
     }
     return (self->due == (before->due - 1U)) && (verdict->k == before->k) && (self->k == (uint32_t)(before->k + 1U)) && (verdict->plant <= HG_PLANT_CONFIRMED) &&
            ((verdict->basis == HG_BASIS_SET) || (verdict->basis == HG_BASIS_STATISTICAL)) && (verdict->model_hash == self->config->model_hash);
+}
+
+/* ---- selftest.h ---- */
+
+static inline bool requires_selftest(const hg_node *self, const hg_selftest_config *drive)
+{
+    uint32_t signals = 0U;
+    for (uint8_t i = 0U; i < self->config->detector->groups; i++) {
+        signals += self->config->message[i].width;
+    }
+    bool within = started_node(self) && (drive->spread <= 127U) && (drive->signal < signals) && (drive->size <= 1000000) && (drive->size >= -1000000) && readable(drive->code, signals);
+    for (uint32_t i = 0U; within && (i < signals); i++) {
+        within = (drive->code[i] <= 1000000) && (drive->code[i] >= -1000000);
+    }
+    return within;
+}
+
+static inline bool ensures_selftest_drive(const hg_selftest_config *drive, const hg_selftest_result *result)
+{
+    return result->quiet || (drive->fault > 0U);
 }
 
 #endif

@@ -20,18 +20,19 @@ static bool in_order(const hg_detector *self, const hg_real *real)
     for (uint8_t i = 0U; i < PREDICTORS; i++) {
         fits = fits && (self->memory.predict[i].x == &predictor[i * HG_PREDICT_REALS(1U, 1U, WIDTH)]);
     }
-    return fits && ((BANKS == 0U) || (self->values.data == &predictor[PREDICTOR_REALS]));
+    return fits && ((BANKS == 0U) || (self->values.data == &predictor[PREDICTOR_REALS + (POLYNOMIALS * STATISTIC_REALS)]));
 }
 
 /** What starts is a detector that samples can leave: its tables are as its steps need them, its parts have the memory that they need, one after another and none twice. Null pointers,
  *  too little memory and tables that contradict one another are refused.
  *  GROUPS groups of WIDTH signals, PREDICTORS of them predicted, STATES uncertain states, GENERATORS generators of RESIDUALS residuals by hulls, or by zonotopes of COLUMNS columns,
- *  BANKS banks, HISTORY rows; tables of any content.
+ *  BANKS banks, POLYNOMIALS filters, HISTORY rows; tables of any content.
  *  @proves hg_detector_start hg_detector_reals hg_detector_sums
  *  @without conversion: bits of groups are cut on purpose
- *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS ANY_SUMS
- *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS ANY_SUMS
- *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=3U HORIZON=2U COLUMNS=1U ANY_NUMBERS ANY_SUMS */
+ *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=7 limit=90 hg_detector_start.0:70 hg_ring_reset.0:13 GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=3U HORIZON=2U COLUMNS=1U ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=30 limit=3600 hg_detector_start.0:150 hg_ring_reset.0:13 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=1U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS ANY_SUMS */
 void proof_detector_start(void)
 {
     const hg_detector_config config = any_detector_config();
@@ -63,14 +64,16 @@ void proof_detector_start(void)
 /** A step asks of its parts what they were proven to do and no more: no undefined behaviour, a finding that there is, no past rewritten that is not kept; a detector is again
  *  one that samples can leave.
  *  GROUPS groups of WIDTH signals, PREDICTORS of them predicted, STATES uncertain states, GENERATORS generators of RESIDUALS residuals by hulls, or by zonotopes of COLUMNS columns,
- *  BANKS banks, HISTORY rows; any tables that hg_detector_start() accepts, any state, any numbers.
+ *  BANKS banks, POLYNOMIALS filters, whose own part is proven with the tables of a shipped model (polynomial.c), HISTORY rows; any tables that hg_detector_start() accepts, any state,
+ *  any numbers.
  *  @proves hg_detector_step
  *  @stub hg_hold_step hg_hold_past hg_hold_rewrite hg_predict_step hg_mismatch_step hg_mismatch_grow hg_residual_step hg_hull_reset hg_hull_step
- *  @stub hg_zonotope_reset hg_zonotope_widen hg_zonotope_step hg_bank_reset hg_bank_step
+ *  @stub hg_zonotope_reset hg_zonotope_widen hg_zonotope_step hg_bank_reset hg_bank_step hg_statistic_step
  *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
- *  @run check real=f32 unwind=5 limit=150 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=3U HORIZON=3U COLUMNS=1U ANY_NUMBERS */
+ *  @run check real=f32 unwind=5 limit=150 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=30 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=3U HORIZON=3U COLUMNS=1U ANY_NUMBERS */
 void proof_detector_step(void)
 {
     const hg_detector_config config = any_detector_config();
@@ -92,10 +95,11 @@ void proof_detector_step(void)
  *  A detector begun again keeps its holds, and is one that samples can leave.
  *  Sizes as above; any tables, any state, any codes.
  *  @proves hg_detector_receive hg_detector_lose hg_detector_restart
- *  @stub hg_hold_receive hg_predict_reset hg_residual_reset hg_hull_reset hg_zonotope_reset hg_bank_reset
+ *  @stub hg_hold_receive hg_predict_reset hg_residual_reset hg_hull_reset hg_zonotope_reset hg_bank_reset hg_statistic_reset
  *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
- *  @run check real=f32 unwind=7 limit=90 hg_ring_reset.0:13 GROUPS=2U WIDTH=2U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=1U HORIZON=2U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=7 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=1U ANY_NUMBERS */
+ *  @run check real=f32 unwind=7 limit=90 hg_ring_reset.0:13 GROUPS=2U WIDTH=2U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=1U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=7 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=1U ANY_NUMBERS
+ *  @run check real=f32 unwind=30 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=0U POLYNOMIALS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS */
 void proof_detector_receive(void)
 {
     const hg_detector_config config = any_detector_config();

@@ -260,6 +260,66 @@ hg_status stub_hg_bank_step(hg_bank *self, const hg_ring *value, const hg_ring *
     return status;
 }
 
+/* ---- polynomial.h, statistic.h ---- */
+
+#if HG_WITH_POLYNOMIAL
+/* What others read of a filter: the point of expansion and the judgement. */
+static void write_polynomial(hg_polynomial *self)
+{
+    hg_polynomial_judgement any;
+    self->judgement = any;
+    self->dropped = any_u16();
+    self->held = any_u16();
+    self->restarts = any_u16();
+    write_reals(self->c, self->config->states);
+}
+
+void stub_hg_polynomial_reset(hg_polynomial *self)
+{
+    prove(requires_polynomial_reset(self), "contract of hg_polynomial_reset()");
+    write_polynomial(self);
+    assume(started_polynomial(self));
+}
+
+hg_status stub_hg_polynomial_step(hg_polynomial *self, const hg_real *y, const hg_real *radius)
+{
+    prove(requires_polynomial_step(self, y, radius), "contract of hg_polynomial_step()");
+    const hg_polynomial before = *self;
+    const hg_status status = any_status();
+    write_polynomial(self);
+    assume(ensures_polynomial_step(self, &before, status) && started_polynomial(self));
+    return status;
+}
+
+static void write_statistic(hg_statistic *self)
+{
+    self->samples = any_u8();
+    write_polynomial(&self->filter);
+    write_reals(self->y, self->config->filter.outputs);
+    write_reals(self->radius, self->config->filter.outputs);
+}
+
+void stub_hg_statistic_reset(hg_statistic *self)
+{
+    prove(started_statistic(self), "contract of hg_statistic_reset()");
+    const hg_statistic before = *self;
+    write_statistic(self);
+    assume(ensures_statistic_reset(self, &before));
+}
+
+hg_status stub_hg_statistic_step(hg_statistic *self, const hg_real *value, const hg_real *radius, hg_real *r, hg_real *J)
+{
+    prove(requires_statistic_step(self, value, radius, r, J), "contract of hg_statistic_step()");
+    const hg_statistic before = *self;
+    const hg_status status = any_status();
+    write_statistic(self);
+    write_reals(r, HG_STATISTICS);
+    write_reals(J, HG_STATISTICS);
+    assume(ensures_statistic_step(self, &before, status));
+    return status;
+}
+#endif
+
 /* ---- detector.h ---- */
 
 /* Anything but what it is made of: counts, rows and states of its parts, and all numbers of the last sample. */
@@ -295,6 +355,11 @@ static void write_detector(hg_detector *self)
         }
 #endif
     }
+#if HG_WITH_POLYNOMIAL
+    for (uint8_t p = 0U; p < config->polynomials; p++) {
+        write_statistic(&part->polynomial[p]);
+    }
+#endif
     for (uint8_t b = 0U; b < config->banks; b++) {
         write_bank(&part->bank[b]);
     }
@@ -540,6 +605,14 @@ hg_status stub_hg_node_step(hg_node *self, hg_verdict *verdict)
                             .refused = any_bool()};
     assume(ensures_node_step(self, &before, verdict, status) && started_node(self));
     return status;
+}
+
+void stub_hg_selftest_drive(hg_node *node, const hg_selftest_config *config, hg_selftest_result *result)
+{
+    prove(requires_selftest(node, config), "contract of hg_selftest_drive()");
+    write_node(node);
+    *result = (hg_selftest_result){.digest = any_u32(), .quiet = any_bool(), .found = any_bool()};
+    assume(ensures_selftest_drive(config, result));
 }
 
 #endif
