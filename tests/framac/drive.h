@@ -11,8 +11,10 @@
 #include "__fc_builtin.h"
 
 extern volatile int any; /* another unknown number at each read */
+extern volatile hg_real any_real; /* the same of the library's type, in floating point NaN and infinity too */
 
 #define LENGTH(type, member) (sizeof(((type *)0)->member) / sizeof(((type *)0)->member[0]))
+#define LENGTH_OF(array) (sizeof(array) / sizeof((array)[0]))
 
 static inline bool maybe(void)
 {

@@ -3,7 +3,7 @@
 #include "fusion5.h"
 
 volatile int any;
-volatile float any_real;
+volatile hg_real any_real;
 
 static hg_fusion5_tracker application; /* as an application has it: started, and no more */
 static hg_tracker tracker;

@@ -1,8 +1,5 @@
-/* A polynomial filter as the judge; memory under a guard. */
+/* A polynomial filter as the judge. */
 #include "drive.h"
-
-#include "hullguard/guard.h"
-
 #include "two_state.h"
 
 volatile int any;
@@ -16,21 +13,8 @@ static int32_t code[LENGTH(hg_two_state_node, code)];
 static int32_t closing[LENGTH(hg_two_state_node, closing)];
 static hg_real real[LENGTH(hg_two_state_node, real)];
 
-static void sealed(void)
-{
-    uint8_t memory[7];
-    hg_guard guard = {.sum = 0U};
-    for (uint8_t i = 0U; i < sizeof(memory); i++) {
-        memory[i] = (uint8_t)any;
-    }
-    (void)hg_guard_seal(&guard, memory, sizeof(memory));
-    memory[2] = (uint8_t)any;
-    (void)hg_guard_check(&guard, memory, sizeof(memory));
-}
-
 int main(void)
 {
-    sealed();
     const hg_node_memory memory = {
         .detector = {.hold = hold, .polynomial = polynomial, .alarm = alarm, .code = code, .codes = LENGTH(hg_two_state_node, code),
                      .real = real, .reals = LENGTH(hg_two_state_node, real)},
