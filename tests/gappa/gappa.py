@@ -27,7 +27,7 @@ from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 
-from hullguard.design import bank_table, hull, mismatch, uio_hull, zonotope
+from hullguard.design import hull, mismatch, uio_hull, zonotope
 from hullguard.design.arith import gamma32, share32
 from hullguard.design.tables import FLOAT32, SignalTable, signal_table
 from hullguard.model import load_model
