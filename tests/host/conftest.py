@@ -15,6 +15,7 @@ hypothesis.settings.load_profile("hullguard")
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "wrong: with a library that is wrong on purpose; `make check` runs them")
     if getattr(config.option, "hypothesis_seed", None) is None:
         hypothesis.core.global_force_seed = SEED
     # Commands that are run as processes find the package where the tests do.

@@ -120,6 +120,7 @@ def use(monkeypatch: pytest.MonkeyPatch, mutant: Library) -> None:
     monkeypatch.setattr(campaign_case, "library", instead)
 
 
+@pytest.mark.wrong
 @pytest.mark.parametrize("name", MUTANTS)
 def test_without_its_share_there_are_false_alarms(models: Models, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> None:
     variant, patch = MUTANTS[name]
@@ -132,6 +133,7 @@ def test_without_its_share_there_are_false_alarms(models: Models, monkeypatch: p
 NO_GROWTH = {"mismatch.c": [("out[i] = hg_real_min(hg_real_add(out[i], hg_acc_real(sum, config->exponent)), HG_REAL_MAX);", "out[i] = hg_real_min(out[i], hg_acc_real(sum, 0) + HG_REAL_MAX);")]}
 
 
+@pytest.mark.wrong
 def test_thresholds_behind_a_gap_count_what_uncertain_states_did_meanwhile(models: Models, tmp_path: Path) -> None:
     """Its share is too small for an alarm of its own: it shows in the thresholds, which a hull never has higher without it."""
     made = models.design(VARIANTS["uncertain"].overrides, "manoeuvres")

@@ -32,6 +32,7 @@ void check_bytes(const void *a, const void *b, size_t length, const char *file, 
 #define assert_true(x) check_true((x) ? 1 : 0, #x, __FILE__, __LINE__)
 #define assert_false(x) check_true((x) ? 0 : 1, "not " #x, __FILE__, __LINE__)
 #define assert_int_equal(a, b) check_integers((intmax_t)(a), (intmax_t)(b), __FILE__, __LINE__)
+#define assert_ptr_equal(a, b) check_integers((intmax_t)(uintptr_t)(a), (intmax_t)(uintptr_t)(b), __FILE__, __LINE__)
 #define assert_in_range(x, low, high) check_range((uintmax_t)(x), (uintmax_t)(low), (uintmax_t)(high), __FILE__, __LINE__)
 #define assert_memory_equal(a, b, length) check_bytes((a), (b), (length), __FILE__, __LINE__)
 

@@ -13,7 +13,7 @@ UNIT_TARGETS := $(foreach t,$(RUN_TARGETS),$(if $(filter-out none,$(LIBC_$(t))),
 
 # Unit tests that need more than the 16 KB of RAM of the microbit: what was compiled for Cortex-M0 runs on the board of Cortex-M3, whose
 # instructions contain M0's. No test is left out on any target.
-UNIT_LARGE_cortex_m0 := test_adversary test_bank test_fusion test_fusion_plants test_hold test_hull test_linalg test_mismatch test_node test_polynomial test_polynomial_plants test_ring test_robust test_tracker test_zonotope
+UNIT_LARGE_cortex_m0 := test_adversary test_bank test_consistency test_detector_all test_fusion test_fusion_plants test_hold test_hull test_linalg test_mismatch test_node test_polynomial test_polynomial_plants test_ring test_robust test_tracker test_zonotope
 UNIT_BOARD_cortex_m0 := cortex_m3
 
 # These take 7 s to minutes on each target. `make check` runs the others, on the smallest core, on one with an FPU and on the big-endian one, beside

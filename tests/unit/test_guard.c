@@ -44,7 +44,7 @@ static void memory_as_it_was_sealed_is_good(void **state)
         uint8_t *const at = &memory[offset];
         fill(at);
         for (uint32_t bytes = 1U; bytes <= BYTES; bytes++) {
-            hg_guard guard;
+            hg_guard guard = {0};
             uint8_t before[sizeof(memory)];
             (void)memcpy(before, memory, sizeof(memory));
             assert_status(HG_OK, hg_guard_seal(&guard, at, bytes));
@@ -77,7 +77,7 @@ static void the_seal_is_the_defined_sum(void **state)
     (void)state;
     fill(memory);
     for (uint32_t bytes = 1U; bytes <= BYTES; bytes++) {
-        hg_guard guard;
+        hg_guard guard = {0};
         assert_status(HG_OK, hg_guard_seal(&guard, memory, bytes));
         assert_int_equal(defined(memory, bytes), guard.sum);
     }
@@ -88,7 +88,7 @@ static void every_bit_of_memory_and_seal_counts(void **state)
     (void)state;
     fill(memory);
     for (uint32_t bytes = 1U; bytes <= BYTES; bytes++) {
-        hg_guard guard;
+        hg_guard guard = {0};
         assert_status(HG_OK, hg_guard_seal(&guard, memory, bytes));
         for (uint32_t bit = 0U; bit < (8U * bytes); bit++) {
             flip(memory, bit);
@@ -108,7 +108,7 @@ static void every_bit_of_memory_and_seal_counts(void **state)
 static void a_burst_is_found_wherever_it_begins(void **state)
 {
     (void)state;
-    hg_guard guard;
+    hg_guard guard = {0};
     fill(memory);
     assert_status(HG_OK, hg_guard_seal(&guard, memory, BYTES));
     for (uint32_t first = 0U; first < BITS; first++) {
@@ -132,7 +132,7 @@ static void a_burst_is_found_wherever_it_begins(void **state)
 static void of_two_bits_in_two_words_one_pair_in_32_is_missed(void **state)
 {
     (void)state;
-    hg_guard guard;
+    hg_guard guard = {0};
     uint32_t missed = 0U;
     fill(memory);
     assert_status(HG_OK, hg_guard_seal(&guard, memory, 64U));
@@ -162,7 +162,7 @@ static void what_was_never_sealed_does_not_fit(void **state)
 static void another_length_does_not_fit(void **state)
 {
     (void)state;
-    hg_guard guard;
+    hg_guard guard = {0};
     (void)memset(memory, 0, sizeof(memory));
     assert_status(HG_OK, hg_guard_seal(&guard, memory, 32U));
     assert_status(HG_E_DIGEST, hg_guard_check(&guard, memory, 31U));

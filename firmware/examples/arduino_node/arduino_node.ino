@@ -31,6 +31,7 @@ void setup()
 
 void loop()
 {
+    const uint32_t now_us = micros(); // before the frames: one that came in time is not late because this took long
     while (CAN.available() > 0) {
         const CanMsg message = CAN.read();
         hg_can_frame frame = {};
@@ -43,7 +44,7 @@ void loop()
         if (detector.node.due > 0) { closed_us = micros(); }
         report();
     }
-    if ((micros() - closed_us) > (period_us + (period_us / 2))) {
+    if ((int32_t)(now_us - closed_us) > (int32_t)(period_us + (period_us / 2))) {
         hg_node_overdue(&detector.node);
         closed_us += period_us;
         report();
