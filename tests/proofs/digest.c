@@ -34,10 +34,10 @@ static void take(hg_digest *self, const tables *t, uint32_t count, bool there)
  *  @proves hg_digest_start hg_digest_open hg_digest_close hg_digest_number hg_digest_bytes hg_digest_halves hg_digest_codes hg_digest_masks hg_digest_reals
  *  @stub hg_crc32c
  *  @without conversion unsigned-overflow: codes go as words of 32 bits, done is meant to wrap
- *  @run check real=f32 unwind=6 limit=90 KIND=1U NUMBERS=2U
- *  @run check real=f32 unwind=6 limit=90 KIND=2U NUMBERS=2U
+ *  @run deep real=f32 unwind=6 limit=90 KIND=1U NUMBERS=2U
+ *  @run deep real=f32 unwind=6 limit=90 KIND=2U NUMBERS=2U
  *  @run check real=f32 unwind=6 limit=90 KIND=3U NUMBERS=2U
- *  @run check real=f32 unwind=6 limit=90 KIND=4U NUMBERS=2U
+ *  @run deep real=f32 unwind=6 limit=90 KIND=4U NUMBERS=2U
  *  @run check real=f32 unwind=6 limit=90 KIND=5U NUMBERS=2U */
 void proof_digest_walk(void)
 {

@@ -7,7 +7,8 @@
 /** The running sums are those of the samples in the window, exactly, and the sensor is silent only with a full window; null pointers and numbers out of range are refused.
  *  A window of WINDOW, SAMPLES samples of any codes of BITS bits, with and without trend.
  *  @proves hg_variance_start hg_variance_step
- *  @run check real=f32 unwind=8 limit=150 WINDOW=3U SAMPLES=4U BITS=3
+ *  @run check real=f32 unwind=8 limit=150 WINDOW=3U SAMPLES=4U BITS=2
+ *  @run deep real=f32 unwind=8 limit=600 WINDOW=3U SAMPLES=4U BITS=3
  *  @run deep real=f32 unwind=10 limit=3600 WINDOW=4U SAMPLES=8U BITS=8 */
 void proof_variance_sums(void)
 {
