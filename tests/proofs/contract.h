@@ -12,6 +12,7 @@
 #include "proof.h"
 
 #include "hullguard/digest.h"
+#include "hullguard/tracker.h"
 #include "hullguard/selftest.h"
 
 #include <stdlib.h>
@@ -514,6 +515,144 @@ static inline bool state_node(const hg_node *self)
     }
     return in_range;
 }
+
+/* ---- linalg.h ---- */
+
+/* It ends, with any number. */
+static inline bool ensures_linalg_root(hg_real y)
+{
+    return (y <= HG_REAL_ZERO) || (y >= HG_REAL_ZERO) || (y != y);
+}
+
+/* ---- fusion.h ---- */
+
+#if HG_REAL_F32 || HG_REAL_F64
+/* Of one sensor between two calls, its last update's record and its loss rate, which chooses a row of the tables. */
+static inline bool state_fusion_sensor(const hg_fusion *self, uint8_t i)
+{
+    const hg_fusion_sensor *sensor = &self->sensor[i];
+    return writable(sensor, 1U) && writable(&self->record[i], 1U) && writable(self->record[i].gain, self->config->states) && (sensor->loss >= HG_REAL_ZERO) &&
+           (sensor->loss <= HG_REAL_C(1.0)) && (sensor->counter < self->config->modulus);
+}
+
+/* Of the place of one sample: one that is held knows its table, and counters of values are in range. */
+static inline bool state_fusion_slot(const hg_fusion *self, uint8_t place)
+{
+    const hg_fusion_config *config = self->config;
+    const hg_fusion_slot *slot = &self->slot[place];
+    const uint32_t n = config->states;
+    const uint8_t back = (uint8_t)((self->newest >= place) ? (self->newest - place) : ((self->newest + config->depth + 1U) - place));
+    bool known = back >= self->held;
+    for (uint8_t t = 0U; t < config->tables; t++) {
+        known = known || (slot->table == &config->table[t]);
+    }
+    known = known && writable(slot->x, n) && writable(slot->P, n * n) && writable(slot->shift, n) && writable(slot->u, config->inputs) && writable(slot->entry, config->sensors);
+    for (uint8_t i = 0U; known && (back < self->held) && (i < config->sensors); i++) {
+        known = slot->entry[i].counter < config->modulus;
+    }
+    return known;
+}
+
+static inline bool started_fusion(const hg_fusion *self)
+{
+    const hg_fusion_config *config = self->config;
+    const uint32_t n = config->states;
+    bool started = hg_fusion_valid(config) && (self->newest <= config->depth) && (self->held <= (config->depth + 1U)) && ((!self->open) || (self->held >= 1U));
+    started = started && writable(self->origin, n) && writable(self->x, n) && writable(self->P, n * n) && writable(self->ahead, n) && writable(self->wide, n * n) &&
+              writable(self->product, n * n) && writable(self->g, n) && writable(self->next, n) && writable(self->move, n);
+    for (uint8_t l = 0U; started && (l <= config->depth); l++) {
+        started = state_fusion_slot(self, l);
+    }
+    for (uint8_t i = 0U; started && (i < config->sensors); i++) {
+        started = state_fusion_sensor(self, i);
+    }
+    return started;
+}
+
+/* Where its parts are. */
+static inline bool kept_fusion(const hg_fusion *self, const hg_fusion *before)
+{
+    return (self->config == before->config) && (self->slot == before->slot) && (self->sensor == before->sensor) && (self->record == before->record) && (self->origin == before->origin) &&
+           (self->x == before->x) && (self->P == before->P) && (self->next == before->next);
+}
+
+static inline bool requires_fusion_sensor(const hg_fusion *self, uint8_t i)
+{
+    return started_fusion(self) && (i < self->config->sensors);
+}
+
+static inline bool ensures_fusion_reset(const hg_fusion *self, const hg_fusion *before)
+{
+    return started_fusion(self) && kept_fusion(self, before) && (self->held == 0U) && (!self->open) && (self->k == UINT32_MAX);
+}
+
+static inline bool ensures_fusion_open(const hg_fusion *self, const hg_fusion *before, hg_status status)
+{
+    return started_fusion(self) && kept_fusion(self, before) && self->open && (status == (before->open ? HG_E_BUSY : HG_OK)) &&
+           (self->k == (uint32_t)(before->k + (before->open ? 0U : 1U)));
+}
+
+static inline bool ensures_fusion_due(const hg_fusion *self, hg_status status)
+{
+    return (status == HG_OK) || (status == HG_E_EMPTY) || (status == HG_E_NUMERIC) || ((status == HG_E_STATE) && (!self->open));
+}
+
+static inline bool ensures_fusion_receive(const hg_fusion *self, const hg_fusion *before, hg_status status)
+{
+    return started_fusion(self) && kept_fusion(self, before) && (self->open == before->open) && (self->k == before->k) &&
+           ((status == HG_OK) || (status == HG_E_STAMP) || (status == HG_E_REPEATED) || (status == HG_E_NUMERIC));
+}
+
+static inline bool ensures_fusion_close(const hg_fusion *self, const hg_fusion *before, hg_status status)
+{
+    const bool done = (status == HG_OK) || ((status == HG_E_NUMERIC) && (self->held == 0U));
+    return started_fusion(self) && kept_fusion(self, before) && (!self->open) && (self->k == before->k) && (before->open ? done : (status == HG_E_STATE));
+}
+
+/* ---- consistency.h ---- */
+
+static inline bool state_consistency(const hg_consistency *self)
+{
+    const uint32_t n = self->fusion->config->states;
+    const uint8_t m = self->fusion->config->sensors;
+    const uint8_t onsets = self->config->onsets;
+    const uint32_t sums = (uint32_t)onsets * m;
+    bool there = (onsets >= 1U) && (self->onset < onsets) && (self->leader < m) && ((self->blamed >> m) == 0U) && readable(self->config->least, m) && writable(self->sum, sums) &&
+                 writable(self->sensor, m) && writable(self->f, sums * n) && writable(self->next, n);
+    for (uint8_t i = 0U; there && (i < m); i++) {
+        there = readable(&self->fusion->record[i], 1U) && readable(self->fusion->record[i].gain, n);
+    }
+    return there;
+}
+
+static inline bool requires_consistency_step(const hg_consistency *self)
+{
+    return state_consistency(self);
+}
+
+static inline bool ensures_consistency_step(const hg_consistency *self, const hg_consistency *before, uint16_t blamed)
+{
+    return state_consistency(self) && (blamed == self->blamed) && (self->config == before->config) && (self->fusion == before->fusion) && (self->sum == before->sum) &&
+           (self->sensor == before->sensor) && (self->f == before->f) && (self->next == before->next);
+}
+
+/* ---- tracker.h ---- */
+
+/* Between two calls a sample is open, and links, clock and judgement are as the filter's. */
+static inline bool started_tracker(const hg_tracker *self)
+{
+    const hg_tracker_config *config = self->config;
+    const hg_fusion_config *fusion = config->fusion;
+    bool started = (config->heartbeat >= 1U) && (config->interval >= 1U) && (self->fusion.config == fusion) && started_fusion(&self->fusion) && self->fusion.open;
+    started = started && writable(self->value, fusion->states) && writable(self->deviation, fusion->states) && (self->due <= 8U) && (self->ahead_max <= 7U) &&
+              (self->slipped_counter < fusion->modulus) && (self->slipped_stamp <= 15U) && (self->verdict_counter <= 15U) && (self->status_counter <= 15U);
+    for (uint8_t i = 0U; started && (i <= fusion->sensors); i++) {
+        started = writable(&self->link[i], 1U) && (self->link[i].receiver.counter < fusion->modulus);
+    }
+    const hg_consistency *judge = &self->consistency;
+    return started && ((config->consistency == NULL) || ((judge->config == config->consistency) && (judge->fusion == &self->fusion) && state_consistency(judge)));
+}
+#endif
 
 /* ---- crc32c.h, digest.h ---- */
 

@@ -70,7 +70,7 @@ void proof_detector_start(void)
  *  @stub hg_hold_step hg_hold_past hg_hold_rewrite hg_predict_step hg_mismatch_step hg_mismatch_grow hg_residual_step hg_hull_reset hg_hull_step
  *  @stub hg_zonotope_reset hg_zonotope_widen hg_zonotope_step hg_bank_reset hg_bank_step hg_statistic_step
  *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
- *  @run check real=f32 unwind=5 limit=150 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run deep real=f32 unwind=5 limit=150 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
  *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
  *  @run check real=f32 unwind=30 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS
  *  @run check real=f32 unwind=5 limit=150 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=1U RESIDUALS=1U BANKS=0U POLYNOMIALS=0U HISTORY=3U HORIZON=3U COLUMNS=1U ANY_NUMBERS */
@@ -97,7 +97,7 @@ void proof_detector_step(void)
  *  @proves hg_detector_receive hg_detector_lose hg_detector_restart
  *  @stub hg_hold_receive hg_predict_reset hg_residual_reset hg_hull_reset hg_zonotope_reset hg_bank_reset hg_statistic_reset
  *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
- *  @run check real=f32 unwind=7 limit=90 hg_ring_reset.0:13 GROUPS=2U WIDTH=2U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=1U HORIZON=2U COLUMNS=0U ANY_NUMBERS
+ *  @run deep real=f32 unwind=7 limit=90 hg_ring_reset.0:13 GROUPS=2U WIDTH=2U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=1U HORIZON=2U COLUMNS=0U ANY_NUMBERS
  *  @run check real=f32 unwind=7 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=1U POLYNOMIALS=0U HISTORY=2U HORIZON=2U COLUMNS=1U ANY_NUMBERS
  *  @run check real=f32 unwind=30 limit=90 GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=2U RESIDUALS=1U BANKS=0U POLYNOMIALS=1U HISTORY=2U HORIZON=2U COLUMNS=0U ANY_NUMBERS */
 void proof_detector_receive(void)

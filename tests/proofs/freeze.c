@@ -44,7 +44,7 @@ void proof_freeze_start(void)
  *  @stub hg_crc32c
  *  @without conversion unsigned-overflow: places go round the ring, the number of a record is meant to wrap
  *  @run check real=f32 unwind=12 limit=90 sum.0:24 SAMPLES=2U GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS PROTECTION=1U
- *  @run check real=f64 unwind=12 limit=90 sum.0:36 SAMPLES=2U GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS PROTECTION=1U */
+ *  @run deep real=f64 unwind=12 limit=90 sum.0:36 SAMPLES=2U GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS PROTECTION=1U */
 void proof_freeze_step(void)
 {
     const hg_detector_config tables = any_detector_config();

@@ -1,138 +1,151 @@
 /** @file
  *  fusion.h, consistency.h: event-triggered fusion of a small plant. Numbers are any, NaN and infinity among them; sizes are those of a run. */
-#include "proof.h"
+#include "any_fusion.h"
 
-#include "hullguard/consistency.h"
-
-#define SLOTS (DEPTH + 1U)
-#define REALS HG_FUSION_REALS(STATES, 0U, SENSORS, DEPTH)
-
-typedef struct {
-    hg_real         A[STATES * STATES];
-    hg_real         Q[STATES * STATES];
-    hg_real         x0[STATES];
-    hg_real         P0[STATES * STATES];
-    uint8_t         select[SENSORS];
-    hg_real         R[SENSORS];
-    hg_real         range[SENSORS];
-    hg_real         origin[STATES];
-    hg_real         level[SENSORS];
-    hg_real         relax[SENSORS];
-    hg_real         early[SENSORS];
-    hg_fusion_table table;
-} tables;
-
-typedef struct {
-    hg_fusion_slot   slot[SLOTS];
-    hg_fusion_entry  entry[SLOTS * SENSORS];
-    hg_fusion_sensor sensor[SENSORS];
-    hg_fusion_record record[SENSORS];
-    int32_t          origin[STATES];
-    hg_real          real[REALS];
-} storage;
-
-static hg_fusion_config any_config(tables *t)
+/* What the parts were given of the filter's numbers: one after another, none twice. */
+static bool in_order(const hg_fusion *self, const hg_real *real)
 {
-    hg_fusion_config config;
-    config.states = STATES;
-    config.inputs = 0U;
-    config.sensors = SENSORS;
-    config.depth = DEPTH;
-    config.A = t->A;
-    config.B = NULL;
-    config.Q = t->Q;
-    config.x0 = t->x0;
-    config.P0 = t->P0;
-    config.select = t->select;
-    config.C = NULL;
-    config.R = t->R;
-    config.range = t->range;
-    config.origin = any_bool() ? t->origin : NULL;
-    config.rates = 1U;
-    config.tables = 1U;
-    t->table = (hg_fusion_table){.alive = any_u16(), .level = t->level, .relax = t->relax, .early = t->early};
-    config.table = &t->table;
-    return config;
+    const hg_real *scratch = &real[SLOTS * STATES * (STATES + 2U)];
+    bool fits = true;
+    for (uint8_t l = 0U; l < SLOTS; l++) {
+        const hg_fusion_slot *slot = &self->slot[l];
+        const hg_real *own = &real[l * STATES * (STATES + 2U)];
+        fits = fits && (slot->x == own) && (slot->P == &own[STATES]) && (slot->shift == &own[STATES + (STATES * STATES)]);
+    }
+    fits = fits && (self->x == scratch) && (self->ahead == &scratch[STATES]) && (self->g == &scratch[2U * STATES]) && (self->next == &scratch[3U * STATES]) &&
+           (self->move == &scratch[4U * STATES]) && (self->P == &scratch[5U * STATES]) && (self->wide == &self->P[STATES * STATES]) && (self->product == &self->wide[STATES * STATES]);
+    return fits && (&self->record[SENSORS - 1U].gain[STATES] == &real[FUSION_REALS]);
 }
 
-/** A filter takes any measurements, stamps and counters, and keeps to its memory: statuses of the closed lists, as many samples held as it has room for; a value twice, of a sample that
- *  is not held, or out of range is refused.
- *  STATES states, SENSORS sensors, DEPTH past samples, counters of up to MODULUS values; any tables that hg_fusion_valid() accepts; SAMPLES samples after a start, a frame each, and whatever a frame can say of the past.
- *  @proves hg_fusion_start hg_fusion_valid hg_fusion_reset hg_fusion_open hg_fusion_due hg_fusion_receive hg_fusion_unwrap hg_fusion_local hg_fusion_number hg_fusion_recall
- *  @proves hg_fusion_exclude hg_fusion_alive
- *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run deep real=f32 unwind=4 limit=3600 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=0U SAMPLES=1U MODULUS=4U ANY_NUMBERS
- *  @run deep real=f32 unwind=5 limit=7200 hg_fusion_recall.0:9 hg_fusion_start.1:6 take_stock.0:17 STATES=2U SENSORS=2U DEPTH=2U SAMPLES=2U MODULUS=16U */
-void proof_fusion(void)
+/** What starts is a filter that samples can leave, with valid tables alone; its parts share its memory without a gap. Null pointers are refused.
+ *  STATES states, SENSORS sensors, DEPTH past samples; tables of any content.
+ *  @proves hg_fusion_start hg_fusion_valid
+ *  @run check real=f32 unwind=6 limit=90 STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES
+ *  @run deep real=f64 unwind=6 limit=90 STATES=1U SENSORS=2U DEPTH=2U MODULUS=256U ANY_NUMBERS */
+void proof_fusion_start(void)
 {
-    tables t;
-    storage s;
-    const hg_fusion_config config = any_config(&t);
-    const hg_fusion_memory memory = {.slot = s.slot, .entry = s.entry, .sensor = s.sensor, .record = s.record, .origin = s.origin, .real = s.real};
+    const hg_fusion_config config = any_fusion_config();
+    const hg_fusion_memory memory = {.slot = any_array(hg_fusion_slot, SLOTS), .entry = any_array(hg_fusion_entry, SLOTS * SENSORS), .sensor = any_array(hg_fusion_sensor, SENSORS),
+                                     .record = any_array(hg_fusion_record, SENSORS), .origin = any_array(int32_t, STATES), .real = any_array(hg_real, FUSION_REALS)};
     hg_fusion self;
-    const hg_status started = hg_fusion_start(&self, &config, &memory);
-    prove((started == HG_OK) == hg_fusion_valid(&config), "what is valid starts");
     prove((hg_fusion_start(NULL, &config, &memory) == HG_E_ARGUMENT) && (hg_fusion_start(&self, NULL, &memory) == HG_E_ARGUMENT) && (hg_fusion_start(&self, &config, NULL) == HG_E_ARGUMENT),
           "null pointers");
-    assume((started == HG_OK) && (config.modulus <= MODULUS));
-    prove(t.select[0] < STATES, "a state that there is");
+    const hg_status status = hg_fusion_start(&self, &config, &memory);
+    prove(status == (hg_fusion_valid(&config) ? HG_OK : HG_E_CONFIG), "what is valid starts");
+    if (status == HG_OK) {
+        prove(started_fusion(&self) && (self.held == 0U) && (!self.open), "as samples can leave it");
+        prove(in_order(&self, memory.real), "no number twice");
+        reach("a start");
+    }
+}
+
+/** A filter takes any measurements, stamps and counters, NaN and infinity among them, in any state, and is again one that samples can leave; a value twice, of a sample that is not held, or
+ *  out of range is refused.
+ *  STATES states, SENSORS sensors, DEPTH past samples, counters of up to MODULUS values; any tables that hg_fusion_valid() accepts, whatever a frame can say.
+ *  @proves hg_fusion_due hg_fusion_receive hg_fusion_unwrap hg_fusion_local hg_fusion_number hg_fusion_recall hg_fusion_exclude hg_fusion_alive
+ *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
+ *  @run check real=f32 unwind=4 limit=90 hg_fusion_recall.0:9 STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES */
+void proof_fusion_frame(void)
+{
+    const hg_fusion_config config = any_fusion_config();
+    assume(hg_fusion_valid(&config));
+    hg_fusion self = any_fusion(&config);
+    assume(started_fusion(&self));
+    const uint8_t i = any_u8_in(0U, SENSORS - 1U);
+    const uint8_t stamp = any_u8();
     hg_real y;
     hg_real period;
-    for (uint8_t k = 0U; k < SAMPLES; k++) {
-        const uint8_t i = any_u8_in(0U, SENSORS - 1U);
-        const uint8_t stamp = any_u8();
-        const hg_status opened = hg_fusion_open(&self, NULL);
-        prove(opened == HG_OK, "opened");
-        prove(hg_fusion_open(&self, NULL) == HG_E_BUSY, "once");
-        hg_fusion_number(&self, any_u32());
-        const hg_status due = hg_fusion_due(&self, i, y, y);
-        prove((due == HG_OK) || (due == HG_E_EMPTY) || (due == HG_E_NUMERIC), "no other status");
+    const hg_fusion before = self;
+    assume(requires_fusion_sensor(&self, i));
+    if (any_bool()) {
         const hg_real near = hg_fusion_unwrap(&self, i, stamp, hg_fusion_local(&self, i, stamp, y), period);
         const hg_status booked = hg_fusion_receive(&self, i, stamp, any_u8(), near);
-        prove((booked == HG_OK) || (booked == HG_E_STAMP) || (booked == HG_E_REPEATED) || (booked == HG_E_NUMERIC), "no other status");
+        prove(ensures_fusion_receive(&self, &before, booked), "a status of the list, as samples can leave it");
+        prove((booked != HG_OK) || (hg_real_abs(near) <= config.range[i]), "in range");
+        prove((booked != HG_OK) || (hg_fusion_receive(&self, i, stamp, any_u8(), near) == HG_E_REPEATED), "one value a sample");
         if (booked == HG_OK) {
-            prove(hg_fusion_receive(&self, i, stamp, any_u8(), near) == HG_E_REPEATED, "one value a sample");
             reach("a frame");
         }
-        const hg_status recalled = hg_fusion_recall(&self, i, any_u8(), any_u8(), y);
+    } else {
+        const hg_status recalled = hg_fusion_recall(&self, i, stamp, any_u8(), y);
         prove((recalled == HG_OK) || (recalled == HG_E_STAMP), "no other status");
-        hg_fusion_exclude(&self, i, any_bool());
-        if ((k + 1U) < SAMPLES) { /* the last is closed by proof_fusion_close() */
-            (void)hg_fusion_close(&self);
+        const hg_status due = hg_fusion_due(&self, i, y, period);
+        prove(ensures_fusion_due(&self, due), "no other status");
+        if (recalled == HG_OK) {
+            reach("a frame of the past");
         }
-        prove((self.held <= SLOTS) && (self.newest < SLOTS), "samples that there is room for");
-        prove((hg_fusion_alive(&self) >> SENSORS) == 0U, "sensors that there are");
     }
+    hg_fusion_number(&self, any_u32());
+    const bool out = any_bool();
+    hg_fusion_exclude(&self, i, out);
+    prove((((uint32_t)self.excluded >> i) & 1U) == (out ? 1U : 0U), "out, or back in");
+    prove((hg_fusion_alive(&self) >> SENSORS) == 0U, "sensors that there are");
+    prove(started_fusion(&self), "as samples can leave it");
+}
+
+/** A filter begun again holds no sample, and is one that samples can leave.
+ *  As above; any state.
+ *  @proves hg_fusion_reset
+ *  @run check real=f32 unwind=6 limit=90 STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES */
+void proof_fusion_reset(void)
+{
+    const hg_fusion_config config = any_fusion_config();
+    assume(hg_fusion_valid(&config));
+    hg_fusion self = any_fusion(&config);
+    assume(started_fusion(&self));
+    const hg_fusion before = self;
     hg_fusion_reset(&self);
+    prove(ensures_fusion_reset(&self, &before), "begun again");
+    prove((self.sensor[SENSORS - 1U].age == config.heartbeat) && (self.resets == before.resets), "every sensor has to speak, and counters go on");
     reach("end");
 }
 
-/** Closing a sample filters it in once; the filter stays finite or begins again, and says so.
- *  STATES states, SENSORS sensors, DEPTH past samples; any tables that hg_fusion_valid() accepts; a start and a sample with any frame of it, or none.
- *  @proves hg_fusion_close hg_fusion_open hg_fusion_receive hg_fusion_reset
+/** A sample is opened once, with a place and a prediction of its own; a filter is again one that samples can leave.
+ *  As above; any state.
+ *  @proves hg_fusion_open
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run deep real=f32 unwind=4 limit=3600 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=0U MODULUS=4U ANY_NUMBERS
- *  @run deep real=f32 unwind=4 limit=3600 hg_fusion_start.1:6 take_stock.0:5 STATES=1U SENSORS=1U DEPTH=1U MODULUS=4U ANY_NUMBERS */
+ *  @run check real=f32 unwind=6 limit=90 STATES=1U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES */
+void proof_fusion_open(void)
+{
+    const hg_fusion_config config = any_fusion_config();
+    assume(hg_fusion_valid(&config));
+    hg_fusion self = any_fusion(&config);
+    assume(started_fusion(&self));
+    const hg_fusion before = self;
+    const hg_status status = hg_fusion_open(&self, NULL);
+    prove(ensures_fusion_open(&self, &before, status), "once, the next, as samples can leave it");
+    if (status == HG_OK) {
+        prove((self.held == ((before.held < SLOTS) ? (before.held + 1U) : SLOTS)), "one more is held");
+        prove(self.slot[self.newest].entry[SENSORS - 1U].known == HG_FUSION_NOTHING, "of which nothing is known");
+        reach("a sample");
+    }
+}
+
+/** Closing a sample filters it in once; the filter stays finite or begins again, and says so; it is again one that samples can leave, its loss rates between 0 and 1.
+ *  As above; any state, with any frames booked.
+ *  @proves hg_fusion_close
+ *  @stub hg_linalg_root
+ *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
+ *  @run check real=f32 unwind=6 limit=90 STATES=1U SENSORS=1U DEPTH=0U MODULUS=2U ANY_SHARES
+ *  @run deep real=f32 unwind=6 limit=1800 STATES=1U SENSORS=1U DEPTH=0U MODULUS=3U ANY_SHARES
+ *  @run deep real=f32 unwind=6 limit=1800 STATES=1U SENSORS=1U DEPTH=1U MODULUS=2U ANY_SHARES
+ *  @run deep real=f32 unwind=6 limit=3600 STATES=2U SENSORS=2U DEPTH=1U MODULUS=4U ANY_SHARES */
 void proof_fusion_close(void)
 {
-    tables t;
-    storage s;
-    const hg_fusion_config config = any_config(&t);
-    const hg_fusion_memory memory = {.slot = s.slot, .entry = s.entry, .sensor = s.sensor, .record = s.record, .origin = s.origin, .real = s.real};
-    hg_fusion self;
-    hg_real y;
-    assume((hg_fusion_start(&self, &config, &memory) == HG_OK) && (config.modulus <= MODULUS));
-    prove(hg_fusion_close(&self) == HG_E_STATE, "no sample is open");
-    prove(hg_fusion_open(&self, NULL) == HG_OK, "opened");
-    if (any_bool()) {
-        (void)hg_fusion_receive(&self, 0U, (uint8_t)(self.k & 15U), any_u8(), y);
+    const hg_fusion_config config = any_fusion_config();
+    assume(hg_fusion_valid(&config));
+    hg_fusion self = any_fusion(&config);
+    assume(started_fusion(&self));
+    const hg_fusion before = self;
+    const hg_status status = hg_fusion_close(&self);
+    prove(ensures_fusion_close(&self, &before, status), "a sample that is open, once, as samples can leave it");
+    prove((status != HG_OK) || (hg_real_finite(self.x[STATES - 1U]) && hg_real_finite(self.P[0])), "a finite estimate");
+    if (status == HG_OK) {
+        reach("a sample");
     }
-    const hg_status closed = hg_fusion_close(&self);
-    prove((closed == HG_OK) || (closed == HG_E_NUMERIC), "no other status");
-    prove(hg_fusion_close(&self) == HG_E_STATE, "closed once");
-    prove((self.held <= SLOTS) && (self.newest < SLOTS), "samples that there is room for");
-    hg_fusion_reset(&self);
-    reach("end");
+    if (status == HG_E_NUMERIC) {
+        reach("a state that is lost");
+    }
 }
 
 /** A consistency test keeps to its memory and blames only sensors that there are, whatever the filter's records are.
@@ -142,18 +155,17 @@ void proof_fusion_close(void)
  *  @run deep real=f32 unwind=10 limit=3600 STATES=3U SENSORS=3U ONSETS=3U */
 void proof_consistency(void)
 {
-    tables t;
     hg_fusion_record record[SENSORS];
     hg_real gain[SENSORS * STATES];
     hg_real least[SENSORS];
     hg_consistency_sum sum[ONSETS * SENSORS];
     hg_consistency_sensor sensor[SENSORS];
     hg_real real[HG_CONSISTENCY_REALS(STATES, SENSORS, ONSETS)];
-    const hg_fusion_config filter = any_config(&t);
+    const hg_fusion_config filter = any_fusion_config();
     for (uint8_t i = 0U; i < SENSORS; i++) {
         record[i].gain = &gain[i * STATES];
         record[i].value = any_bool();
-        assume(t.select[i] < STATES);
+        assume((filter.select == NULL) || (filter.select[i] < STATES));
     }
     const hg_fusion fusion = {.config = &filter, .record = record, .excluded = any_u16()};
     hg_consistency_config config;
@@ -173,14 +185,16 @@ void proof_consistency(void)
     self.next = next;
     self.f = f;
     hg_consistency_reset(&self);
-    self.onset = any_u8_in(0U, ONSETS - 1U);
-    self.since = any_u8_in(0U, config.stride);
-    self.leader = any_u8_in(0U, SENSORS - 1U);
+    self.onset = any_u8();
+    self.since = any_u8();
+    self.leader = any_u8();
     self.leads = any_u8();
     self.rests = any_u8();
+    self.blamed = any_u16();
+    const hg_consistency before = self;
+    assume(requires_consistency_step(&self));
     const uint16_t blamed = hg_consistency_step(&self);
-    prove((blamed >> SENSORS) == 0U, "sensors that there are");
-    prove((self.onset < ONSETS) && (self.leader < SENSORS), "hypotheses that there are");
+    prove(ensures_consistency_step(&self, &before, blamed), "sensors and hypotheses that there are");
     if (blamed != 0U) {
         reach("blamed");
     }

@@ -18,7 +18,7 @@
  *  @proves hg_frame_pack hg_frame_unpack hg_frame_valid hg_e2e_protect hg_e2e_check
  *  @without conversion: bytes and checksums are cut on purpose
  *  @run check real=f32 unwind=65 limit=150 hg_e2e_valid.0:513 MODEL=platoon
- *  @run check real=f32 unwind=65 limit=150 hg_e2e_valid.0:513 MODEL=openacc
+ *  @run deep real=f32 unwind=65 limit=150 hg_e2e_valid.0:513 MODEL=openacc
  *  @run check real=f32 unwind=65 limit=150 hg_e2e_valid.0:513 MODEL=suspension
  *  @run check real=f32 unwind=65 limit=150 hg_e2e_valid.0:513 MODEL=battery_cell
  *  @run check real=q31 unwind=65 limit=150 hg_e2e_valid.0:513 MODEL=platoon

@@ -71,9 +71,27 @@ static inline size_t proof_index(int64_t i, size_t length)
 }
 
 /* Arithmetic. With ANY_NUMBERS floating-point products and quotients are any, with ANY_SUMS sums and differences, too: what is proven then holds whatever they are, and the solver is
-   spared them. Memory safety, and that what enters a state is finite where a comparison says so, hold that way; values do not. */
+   spared them. Memory safety, and that what enters a state is finite where a comparison says so, hold that way; values do not. With ANY_SHARES they keep what rounding keeps of signs and
+   sizes: of numbers that are not negative none is negative, a factor up to 1 makes nothing larger, nor does a divisor from 1 on. */
 #define PROOF_ANY(result) _Generic((result), float: nondet_float(), double: nondet_double(), default: (result))
-#ifdef ANY_NUMBERS
+static inline float proof_times(float a, float b)
+{
+    const float r = nondet_float();
+    const bool positive = (a >= 0.0F) && (a < __builtin_inff()) && (b >= 0.0F) && (b < __builtin_inff());
+    __CPROVER_assume((!positive) || ((r >= 0.0F) && ((b > 1.0F) || (r <= a)) && ((a > 1.0F) || (r <= b))));
+    return r;
+}
+static inline float proof_over(float a, float b)
+{
+    const float r = nondet_float();
+    const bool positive = (a >= 0.0F) && (a < __builtin_inff()) && (b > 0.0F);
+    __CPROVER_assume((!positive) || ((r >= 0.0F) && ((b < 1.0F) || (r <= a))));
+    return r;
+}
+#ifdef ANY_SHARES
+#define PROOF_TIMES(a, b) _Generic((a) * (b), float: proof_times((float)(a), (float)(b)), default: ((a) * (b)))
+#define PROOF_OVER(a, b) _Generic((a) / (b), float: proof_over((float)(a), (float)(b)), default: ((a) / (b)))
+#elif defined(ANY_NUMBERS)
 #define PROOF_TIMES(a, b) PROOF_ANY((a) * (b))
 #define PROOF_OVER(a, b) PROOF_ANY((a) / (b))
 #else

@@ -431,6 +431,163 @@ hg_status stub_hg_frame_unpack(const hg_message *message, const hg_can_frame *fr
     return status;
 }
 
+/* ---- linalg.h, fusion.h, consistency.h ---- */
+
+#if HG_REAL_F32 || HG_REAL_F64
+hg_real stub_hg_linalg_root(hg_real x)
+{
+    (void)x;
+    hg_real any;
+    assume(ensures_linalg_root(any));
+    return any;
+}
+
+static void write_fusion_slot(const hg_fusion_config *config, hg_fusion_slot *slot)
+{
+    const uint32_t n = config->states;
+    write_reals(slot->x, n);
+    write_reals(slot->P, n * n);
+    write_reals(slot->shift, n);
+    for (uint8_t i = 0U; i < config->sensors; i++) {
+        hg_fusion_entry any;
+        any.counted = any_bool();
+        any.expected = any_bool();
+        slot->entry[i] = any;
+    }
+    slot->table = &config->table[any_u8() % config->tables];
+    slot->excluded = any_u16();
+}
+
+/* Anything but where its parts are, and anything in these. */
+static void write_fusion(hg_fusion *self)
+{
+    const hg_fusion_config *config = self->config;
+    const uint32_t n = config->states;
+    for (uint8_t l = 0U; l <= config->depth; l++) {
+        write_fusion_slot(config, &self->slot[l]);
+    }
+    for (uint8_t i = 0U; i < config->sensors; i++) {
+        hg_fusion_sensor any;
+        any.seen = any_bool();
+        self->sensor[i] = any;
+        hg_real number;
+        self->record[i].residual = number;
+        self->record[i].value = any_bool();
+        write_reals(&self->record[i].spread, 1U);
+        write_reals(&self->record[i].y, 1U);
+        write_reals(self->record[i].gain, n);
+    }
+    write_codes(self->origin, n);
+    write_reals(self->x, n);
+    write_reals(self->P, n * n);
+    write_reals(self->ahead, n);
+    write_reals(self->wide, n * n);
+    write_reals(self->product, n * n);
+    write_reals(self->g, n);
+    write_reals(self->next, n);
+    write_reals(self->move, n);
+    self->k = any_u32();
+    self->resets = any_u16();
+    self->newest = any_u8();
+    self->held = any_u8();
+    self->redo = any_u8();
+    self->open = any_bool();
+}
+
+void stub_hg_fusion_reset(hg_fusion *self)
+{
+    prove(started_fusion(self), "contract of hg_fusion_reset()");
+    const hg_fusion before = *self;
+    write_fusion(self);
+    assume(ensures_fusion_reset(self, &before));
+}
+
+hg_status stub_hg_fusion_open(hg_fusion *self, const hg_real *u)
+{
+    prove(started_fusion(self) && readable(u, self->config->inputs), "contract of hg_fusion_open()");
+    const hg_fusion before = *self;
+    const hg_status status = any_status();
+    write_fusion(self);
+    assume(ensures_fusion_open(self, &before, status));
+    return status;
+}
+
+hg_status stub_hg_fusion_due(const hg_fusion *self, uint8_t i, hg_real y, hg_real dice)
+{
+    prove(requires_fusion_sensor(self, i), "contract of hg_fusion_due()");
+    (void)y;
+    (void)dice;
+    const hg_status status = any_status();
+    assume(ensures_fusion_due(self, status));
+    return status;
+}
+
+hg_real stub_hg_fusion_local(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y)
+{
+    prove(requires_fusion_sensor(self, i), "contract of hg_fusion_local()");
+    (void)stamp;
+    (void)y;
+    hg_real any;
+    write_reals(self->next, self->config->states);
+    return any;
+}
+
+hg_real stub_hg_fusion_unwrap(const hg_fusion *self, uint8_t i, uint8_t stamp, hg_real y, hg_real period)
+{
+    prove(requires_fusion_sensor(self, i), "contract of hg_fusion_unwrap()");
+    (void)stamp;
+    (void)y;
+    (void)period;
+    hg_real any;
+    return any;
+}
+
+hg_status stub_hg_fusion_receive(hg_fusion *self, uint8_t i, uint8_t stamp, uint8_t counter, hg_real y)
+{
+    prove(requires_fusion_sensor(self, i), "contract of hg_fusion_receive()");
+    (void)stamp;
+    (void)counter;
+    (void)y;
+    const hg_fusion before = *self;
+    const hg_status status = any_status();
+    write_fusion(self);
+    assume(ensures_fusion_receive(self, &before, status));
+    return status;
+}
+
+hg_status stub_hg_fusion_close(hg_fusion *self)
+{
+    prove(started_fusion(self), "contract of hg_fusion_close()");
+    const hg_fusion before = *self;
+    const hg_status status = any_status();
+    write_fusion(self);
+    assume(ensures_fusion_close(self, &before, status));
+    return status;
+}
+
+uint16_t stub_hg_consistency_step(hg_consistency *self)
+{
+    prove(requires_consistency_step(self), "contract of hg_consistency_step()");
+    const hg_consistency before = *self;
+    const uint16_t blamed = any_u16();
+    const uint8_t m = self->fusion->config->sensors;
+    for (uint16_t s = 0U; s < ((uint16_t)self->config->onsets * m); s++) {
+        hg_consistency_sum any;
+        self->sum[s] = any;
+    }
+    for (uint8_t i = 0U; i < m; i++) {
+        hg_consistency_sensor any;
+        self->sensor[i] = any;
+    }
+    write_reals(self->f, ((uint32_t)self->config->onsets * m) * self->fusion->config->states);
+    write_reals(self->next, self->fusion->config->states);
+    *self = (hg_consistency){.config = before.config, .fusion = before.fusion, .sum = before.sum, .sensor = before.sensor, .f = before.f, .next = before.next, .onset = any_u8(),
+                             .since = any_u8(), .leader = any_u8(), .leads = any_u8(), .rests = any_u8(), .blamed = any_u16()};
+    assume(ensures_consistency_step(self, &before, blamed));
+    return blamed;
+}
+#endif
+
 /* ---- crc32c.h, digest.h ---- */
 
 /* Some function of all that it is given: what is proven with it holds of any checksum. */

@@ -74,9 +74,10 @@ void proof_trigger_step(void)
 
 /** The threshold that sender and receiver compute is 0 for what was sent as invalid, else sigma and the share delta / 65536 of the distance from zero, rounded down and saturated: never negative, and no
  *  larger for a smaller distance.
- *  Any tables of WIDTH channels and LEVELS levels at most, any code.
+ *  Any tables of WIDTH channels and LEVELS levels at most, delta up to SHARE; any code up to RANGE from zero.
  *  @proves hg_trigger_threshold
- *  @run deep real=f32 unwind=5 limit=3600 WIDTH=1U LEVELS=1U */
+ *  @run deep real=f32 unwind=5 limit=90 WIDTH=1U LEVELS=1U SHARE=255U RANGE=1023
+ *  @run deep real=f32 unwind=5 limit=3600 WIDTH=1U LEVELS=1U SHARE=65535U RANGE=4294967295LL */
 void proof_trigger_threshold(void)
 {
     tables t;
@@ -88,6 +89,7 @@ void proof_trigger_threshold(void)
     const int32_t threshold = hg_trigger_threshold(&config, level, channel, sent);
     const size_t i = ((size_t)level * config.width) + channel;
     const int64_t apart = (int64_t)sent - config.zero[channel];
+    assume((config.delta[i] <= SHARE) && (apart <= RANGE) && (apart >= -RANGE));
     const uint64_t relative = ((uint64_t)config.delta[i] * (uint32_t)((apart < 0) ? -apart : apart)) >> 16U;
     const int64_t exact = config.sigma[i] + (int64_t)relative;
     prove((sent == HG_CODE_INVALID) ? (threshold == 0) : (threshold == ((exact > INT32_MAX) ? INT32_MAX : exact)), "the header's equation");
