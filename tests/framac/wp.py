@@ -4,7 +4,7 @@
     wp.py RESULT WORK [CASE ..]    CASE: tests/framac/wp/CASE.acsl; without one all of them
 
 A .acsl file: `file PATH`, `real f32|q31`, `functions NAME ..`, `goals N`; then blocks, each `before TEXT` (a line of the source, blanks at its ends
-aside, that stands there once; `first TEXT`, `second TEXT`, `third TEXT`: that of several; `in PATH` before it: of another file) and the annotation that goes before
+aside, that stands there once; `first TEXT` to `fifth TEXT`: that of several; `in PATH` before it: of another file) and the annotation that goes before
 that line.
 A number of goals that is not N is an error, so that none vanishes. Lemmas, which goals rest on, are proved as well, and count.
 """
@@ -23,7 +23,7 @@ from result import write_to
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 TIMEOUT_S = 20  # of one goal; most take less than 0.1
-ORDINALS = ("first", "second", "third")
+ORDINALS = ("first", "second", "third", "fourth", "fifth")
 PROVED = re.compile(r"Proved goals:\s+(\d+) / (\d+)")
 
 
@@ -71,7 +71,7 @@ def annotate(case: Case, tree: Path) -> None:
         lines = target.read_text().splitlines()
         places = [number for number, text in enumerate(lines) if text.strip() == anchor]
         if len(places) <= (which or 0) or (len(places) > 1 and which is None):
-            sys.exit(f"{case.name}.acsl: '{anchor}' stands {len(places)} times in {file}; it must be there once, or as often as first, second, third say")
+            sys.exit(f"{case.name}.acsl: '{anchor}' stands {len(places)} times in {file}; it must be there once, or as often as `first` to `fifth` say")
         place = places[which or 0]
         lines[place:place] = block
         target.write_text("\n".join(lines) + "\n")
@@ -140,7 +140,8 @@ def main() -> int:
     if len(sys.argv) == 3:
         said = [
             "Saturating counters and the sums of fixed point stop at their ends, are exact inside them, and have no undefined behaviour, for any input",
-            "Rows times a vector, rings, slots of a filter, checksums and seals touch no memory but what their sizes say, whatever these are, and every loop ends",
+            "Rows times a vector, rings, slots of a filter, checksums, seals, walks over tables and thresholds of triggers touch no memory but what their sizes say, "
+            "whatever these are, and every loop ends",
         ]
         write_to(result, [(promise, text) for promise in said])
     print(f"  ok  wp: {text}")
