@@ -33,7 +33,7 @@ static void any_tracker(hg_tracker *self, const hg_tracker_config *config)
  *  @proves hg_tracker_start
  *  @stub hg_fusion_open
  *  @without conversion unsigned-overflow: bytes are cut on purpose, sample indices are meant to wrap
- *  @run deep real=f32 unwind=17 limit=90 hg_e2e_valid.0:65 STATES=1U SENSORS=1U DEPTH=1U ANY_SHARES */
+ *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:65 STATES=1U SENSORS=1U DEPTH=1U ANY_SHARES */
 void proof_tracker_start(void)
 {
     const hg_tracker_config *config = any_tracker_config();
@@ -153,7 +153,7 @@ void proof_tracker_step(void)
  *  @proves hg_fusion_sender_start hg_fusion_sender_step
  *  @stub hg_fusion_due hg_fusion_local hg_frame_pack hg_e2e_protect
  *  @without conversion: bytes are cut on purpose
- *  @run deep real=f32 unwind=17 limit=90 hg_e2e_valid.0:65 STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES */
+ *  @run deep real=f32 unwind=17 limit=300 hg_e2e_valid.0:65 STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES */
 void proof_fusion_sender(void)
 {
     const hg_tracker_config *config = any_tracker_config();

@@ -76,7 +76,7 @@ void proof_trigger_step(void)
  *  larger for a smaller distance.
  *  Any tables of WIDTH channels and LEVELS levels at most, delta up to SHARE; any code up to RANGE from zero.
  *  @proves hg_trigger_threshold
- *  @run deep real=f32 unwind=5 limit=90 WIDTH=1U LEVELS=1U SHARE=255U RANGE=1023
+ *  @run check real=f32 unwind=5 limit=90 WIDTH=1U LEVELS=1U SHARE=255U RANGE=1023
  *  @run deep real=f32 unwind=5 limit=3600 WIDTH=1U LEVELS=1U SHARE=65535U RANGE=4294967295LL */
 void proof_trigger_threshold(void)
 {
