@@ -5,20 +5,9 @@
 
 #include "hullguard/node.h"
 
-#include "small_model.h"
+#include "small_node.h"
 
 #define HEARTBEAT 5U
-
-static const uint8_t ids[HG_E2E_IDS] = {0x11U, 0x22U, 0x33U, 0x44U, 0x55U, 0x66U, 0x77U, 0x88U, 0x99U, 0xAAU, 0xBBU, 0xCCU, 0xDDU, 0xEEU, 0xFFU, 0x10U};
-#define P22 {.profile = HG_E2E_P22, .data_ids = ids, .counter = 8U, .stamp = 12U, .limits = &hg_e2e_limits_default}
-static const hg_e2e_config stamped_rule = P22;
-static const hg_e2e_config own_rule = P22;
-static const hg_e2e_config unstamped_rule = {.profile = HG_E2E_P11, .mode = HG_E2E_NIBBLE, .data_id = 0x123U, .counter = 8U, .nibble = 12U,
-                                             .stamp = HG_E2E_NO_STAMP, .limits = &hg_e2e_limits_default}; /* its counter has 15 values */
-static const hg_e2e_config no_rule = {.profile = HG_E2E_NONE, .mode = HG_E2E_BOTH, .stamp = HG_E2E_NO_STAMP, .limits = &hg_e2e_limits_default};
-static const hg_field fields[2] = {{16U, 16U, HG_FIELD_SIGNED}, {32U, 16U, HG_FIELD_SIGNED}};
-static const hg_message verdict_message = {.id = 0x200U, .length = 8U, .e2e = &own_rule};
-static const hg_message status_message = {.id = 0x201U, .length = 8U, .e2e = &own_rule};
 
 typedef struct {
     hg_node            self;

@@ -4,18 +4,8 @@
 
 #include "hullguard/node.h"
 
-#include "small_model.h"
+#include "small_node.h"
 
-static const uint8_t ids[HG_E2E_IDS] = {0x33U};
-static const hg_e2e_config own_rule = {
-    .profile = HG_E2E_P22, .data_ids = ids, .counter = 8U, .stamp = 12U, .limits = &hg_e2e_limits_default};
-static const hg_e2e_config unstamped_rule = {
-    .profile = HG_E2E_P11, .mode = HG_E2E_NIBBLE, .data_id = 0x123U, .counter = 8U, .nibble = 12U, .stamp = HG_E2E_NO_STAMP,
-    .limits = &hg_e2e_limits_default};
-static const hg_e2e_config no_rule = {.profile = HG_E2E_NONE, .mode = HG_E2E_BOTH, .stamp = HG_E2E_NO_STAMP, .limits = &hg_e2e_limits_default};
-static const hg_field fields[2] = {{16U, 16U, HG_FIELD_SIGNED}, {32U, 16U, HG_FIELD_SIGNED}};
-static const hg_message verdict_message = {.id = 0x200U, .length = 8U, .e2e = &own_rule};
-static const hg_message status_message = {.id = 0x201U, .length = 8U, .e2e = &own_rule};
 static const uint8_t idle[7] = {0U, 0U, 0U, 0U, 0U, 0U, 0xA5U};
 
 static const uint8_t every_second[] = {1U};
@@ -41,7 +31,7 @@ static void begin(rig *r, const hg_e2e_config *e2e, const hg_trigger_config *tri
 {
     (void)memset(r, 0, sizeof(*r));
     r->message[0] = (hg_message){.id = 0x101U, .length = 7U, .width = 2U, .field = fields, .scale = sm_scale, .e2e = e2e, .idle = idle};
-    r->message[1] = (hg_message){.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .e2e = &own_rule};
+    r->message[1] = (hg_message){.id = 0x110U, .length = 4U, .width = 1U, .field = fields, .scale = sm_scale, .e2e = &stamped_rule};
     (void)memcpy(r->hold, sm_hold, sizeof(r->hold));
     r->hold[0].trigger = trigger;
     r->detector = sm_detector;
