@@ -128,7 +128,10 @@ def prove(case: Case, work: Path, env: dict[str, str]) -> bool:
 def main() -> int:
     """Command line."""
     result, work = Path(sys.argv[1]), Path(sys.argv[2]).resolve()
-    names = sys.argv[3:] or sorted(path.stem for path in (HERE / "wp").glob("*.acsl"))
+    known = sorted(path.stem for path in (HERE / "wp").glob("*.acsl"))
+    names = sys.argv[3:] or known
+    if unknown := [name for name in names if name not in known]:
+        sys.exit(f"wp: there is no case {', '.join(unknown)}; choose of {', '.join(known)}")
     work.mkdir(parents=True, exist_ok=True)
     env = environment(work)
     cases = [read(HERE / "wp" / f"{name}.acsl") for name in names]

@@ -210,6 +210,9 @@ def main() -> int:
         print("\n".join(f"seeded: {line}" for line in wrong), file=sys.stderr)
         return 1
     chosen = [fault for fault in faults if fault.of in asked.gate and asked.fault in fault.name] if asked.gate else faults if asked.all else drawn(faults)
+    if not chosen:
+        print(f"seeded: no fault is of gate {', '.join(asked.gate) or '-'} and has '{asked.fault}' in its name; gates: {', '.join(sorted(named))}", file=sys.stderr)
+        return 1
     print(f"seeded: {len(chosen)} of {len(faults)} faults, HULLGUARD_SEED={SEED}", flush=True)
     missed = sum(bool(text) for text in judged(chosen, asked.all, asked.jobs))
     gates = len({fault.of for fault in chosen})
