@@ -20,20 +20,25 @@ static const hg_message *messages_of(uint32_t id, uint8_t count, uint8_t width)
     return message;
 }
 
+static const hg_consistency_config *any_consistency_config(void)
+{
+    hg_consistency_config *config = any_array(hg_consistency_config, 1U);
+    config->onsets = 1U;
+    config->least = any_array(hg_real, SENSORS);
+    return config;
+}
+
 /* Sensors have the identifiers 0 .., the tick the one behind them. */
 static hg_tracker_config *any_tracker_config(void)
 {
     hg_tracker_config *config = any_array(hg_tracker_config, 1U);
     hg_fusion_config *fusion = any_array(hg_fusion_config, 1U);
-    hg_consistency_config *consistency = any_array(hg_consistency_config, 1U);
     hg_tracker_source *source = any_array(hg_tracker_source, SENSORS);
     *fusion = any_fusion_config();
-    consistency->onsets = 1U;
-    consistency->least = any_array(hg_real, SENSORS);
     for (uint8_t i = 0U; i < SENSORS; i++) {
         source[i] = (hg_tracker_source){.message = messages_of(i, 1U, 1U), .wraps = any_bool()};
     }
-    *config = (hg_tracker_config){.fusion = fusion, .consistency = any_bool() ? consistency : NULL, .source = source, .tick = messages_of(SENSORS, 1U, 0U),
+    *config = (hg_tracker_config){.fusion = fusion, .consistency = any_bool() ? any_consistency_config() : NULL, .source = source, .tick = messages_of(SENSORS, 1U, 0U),
                                   .verdict = messages_of(SENSORS + 1U, 1U, 0U), .status = messages_of(SENSORS + 2U, 1U, 0U), .estimate = messages_of(SENSORS + 3U, STATES, 2U),
                                   .heartbeat = any_u16(), .interval = any_u16(), .model_hash = any_u32()};
     return config;

@@ -581,6 +581,52 @@ static inline bool requires_fusion_sensor(const hg_fusion *self, uint8_t i)
     return started_fusion(self) && (i < self->config->sensors);
 }
 
+/* Its tables' sizes are those that the library is made for: what is written for one sensor or state has a bit, or a place, for each. */
+static inline bool ensures_fusion_valid(const hg_fusion_config *config, bool valid)
+{
+    return (!valid) || ((config->states >= 1U) && (config->states <= HG_FUSION_STATES_MAX) && (config->sensors >= 1U) && (config->sensors <= HG_FUSION_SENSORS_MAX) &&
+                        (config->modulus >= 2U) && (config->modulus <= 256U) && (config->depth <= 14U) && (config->heartbeat >= 1U));
+}
+
+/* Memory as the tables' sizes say, if there are any that fit one another. */
+static inline bool requires_fusion_start(const hg_fusion_config *config, const hg_fusion_memory *memory)
+{
+    const uint32_t places = (uint32_t)config->depth + 1U;
+    return (!hg_fusion_valid(config)) ||
+           (writable(memory->slot, places) && writable(memory->entry, places * config->sensors) && writable(memory->sensor, config->sensors) && writable(memory->record, config->sensors) &&
+            writable(memory->origin, config->states) && writable(memory->real, HG_FUSION_REALS(config->states, config->inputs, config->sensors, config->depth)));
+}
+
+/* Its parts have their memory one after another, none twice. */
+static inline bool placed_fusion(const hg_fusion *self, const hg_fusion_memory *memory)
+{
+    const hg_fusion_config *config = self->config;
+    const uint32_t n = config->states;
+    const hg_real *real = memory->real;
+    bool fits = (self->slot == memory->slot) && (self->sensor == memory->sensor) && (self->record == memory->record) && (self->origin == memory->origin);
+    for (uint8_t l = 0U; l <= config->depth; l++) {
+        const hg_fusion_slot *slot = &self->slot[l];
+        fits = fits && (slot->x == real) && (slot->P == &real[n]) && (slot->shift == &real[n + (n * n)]) && (slot->u == &real[n * (n + 2U)]) &&
+               (slot->entry == &memory->entry[(uint32_t)l * config->sensors]);
+        real = &real[(n * (n + 2U)) + config->inputs];
+    }
+    fits = fits && (self->x == real) && (self->ahead == &real[n]) && (self->g == &real[2U * n]) && (self->next == &real[3U * n]) && (self->move == &real[4U * n]) &&
+           (self->P == &real[5U * n]) && (self->wide == &real[(5U + n) * n]) && (self->product == &real[(5U + (2U * n)) * n]);
+    real = &real[(5U + (3U * n)) * n];
+    for (uint8_t i = 0U; i < config->sensors; i++) {
+        fits = fits && (self->record[i].gain == &real[(uint32_t)i * n]);
+    }
+    return fits;
+}
+
+static inline bool ensures_fusion_start(const hg_fusion *self, const hg_fusion_config *config, const hg_fusion_memory *memory, hg_status status)
+{
+    if (!hg_fusion_valid(config)) {
+        return status == HG_E_CONFIG;
+    }
+    return (status == HG_OK) && (self->config == config) && placed_fusion(self, memory) && started_fusion(self) && (self->held == 0U) && (!self->open);
+}
+
 static inline bool ensures_fusion_reset(const hg_fusion *self, const hg_fusion *before)
 {
     return started_fusion(self) && kept_fusion(self, before) && (self->held == 0U) && (!self->open) && (self->k == UINT32_MAX);
@@ -611,18 +657,56 @@ static inline bool ensures_fusion_close(const hg_fusion *self, const hg_fusion *
 
 /* ---- consistency.h ---- */
 
-static inline bool state_consistency(const hg_consistency *self)
+/* Its memory, and of the filter what it reads. */
+static inline bool requires_consistency_reset(const hg_consistency *self)
 {
     const uint32_t n = self->fusion->config->states;
     const uint8_t m = self->fusion->config->sensors;
     const uint8_t onsets = self->config->onsets;
     const uint32_t sums = (uint32_t)onsets * m;
-    bool there = (onsets >= 1U) && (self->onset < onsets) && (self->leader < m) && ((self->blamed >> m) == 0U) && readable(self->config->least, m) && writable(self->sum, sums) &&
-                 writable(self->sensor, m) && writable(self->f, sums * n) && writable(self->next, n);
+    bool there = (onsets >= 1U) && readable(self->config->least, m) && writable(self->sum, sums) && writable(self->sensor, m) && writable(self->f, sums * n) && writable(self->next, n);
     for (uint8_t i = 0U; there && (i < m); i++) {
         there = readable(&self->fusion->record[i], 1U) && readable(self->fusion->record[i].gain, n);
     }
     return there;
+}
+
+static inline bool state_consistency(const hg_consistency *self)
+{
+    const uint8_t m = self->fusion->config->sensors;
+    return requires_consistency_reset(self) && (self->onset < self->config->onsets) && (self->leader < m) && ((self->blamed >> m) == 0U);
+}
+
+static inline bool kept_consistency(const hg_consistency *self, const hg_consistency *before)
+{
+    return (self->config == before->config) && (self->fusion == before->fusion) && (self->sum == before->sum) && (self->sensor == before->sensor) && (self->f == before->f) &&
+           (self->next == before->next);
+}
+
+/* Memory as the tables' sizes say, if they have any, and a filter's records. */
+static inline bool requires_consistency_start(const hg_consistency_config *config, const hg_fusion *fusion, const hg_consistency_memory *memory)
+{
+    const uint8_t m = fusion->config->sensors;
+    const uint32_t n = fusion->config->states;
+    bool there = (config->least == NULL) || readable(config->least, m);
+    for (uint8_t i = 0U; there && (i < m); i++) {
+        there = readable(&fusion->record[i], 1U) && readable(fusion->record[i].gain, n);
+    }
+    return there && writable(memory->sum, (uint32_t)config->onsets * m) && writable(memory->sensor, m) && writable(memory->real, HG_CONSISTENCY_REALS(n, m, config->onsets));
+}
+
+static inline bool ensures_consistency_start(const hg_consistency *self, const hg_consistency_config *config, const hg_fusion *fusion, const hg_consistency_memory *memory, hg_status status)
+{
+    if (status != HG_OK) {
+        return status == HG_E_CONFIG;
+    }
+    return (self->config == config) && (self->fusion == fusion) && (self->sum == memory->sum) && (self->sensor == memory->sensor) && (self->next == memory->real) &&
+           (self->f == &memory->real[fusion->config->states]) && state_consistency(self);
+}
+
+static inline bool ensures_consistency_reset(const hg_consistency *self, const hg_consistency *before)
+{
+    return kept_consistency(self, before) && state_consistency(self) && (self->blamed == 0U);
 }
 
 static inline bool requires_consistency_step(const hg_consistency *self)
@@ -632,8 +716,7 @@ static inline bool requires_consistency_step(const hg_consistency *self)
 
 static inline bool ensures_consistency_step(const hg_consistency *self, const hg_consistency *before, uint16_t blamed)
 {
-    return state_consistency(self) && (blamed == self->blamed) && (self->config == before->config) && (self->fusion == before->fusion) && (self->sum == before->sum) &&
-           (self->sensor == before->sensor) && (self->f == before->f) && (self->next == before->next);
+    return kept_consistency(self, before) && state_consistency(self) && (blamed == self->blamed);
 }
 
 /* ---- tracker.h ---- */

@@ -2,25 +2,10 @@
  *  fusion.h, consistency.h: event-triggered fusion of a small plant. Numbers are any, NaN and infinity among them; sizes are those of a run. */
 #include "any_fusion.h"
 
-/* What the parts were given of the filter's numbers: one after another, none twice. */
-static bool in_order(const hg_fusion *self, const hg_real *real)
-{
-    const hg_real *scratch = &real[SLOTS * STATES * (STATES + 2U)];
-    bool fits = true;
-    for (uint8_t l = 0U; l < SLOTS; l++) {
-        const hg_fusion_slot *slot = &self->slot[l];
-        const hg_real *own = &real[l * STATES * (STATES + 2U)];
-        fits = fits && (slot->x == own) && (slot->P == &own[STATES]) && (slot->shift == &own[STATES + (STATES * STATES)]);
-    }
-    fits = fits && (self->x == scratch) && (self->ahead == &scratch[STATES]) && (self->g == &scratch[2U * STATES]) && (self->next == &scratch[3U * STATES]) &&
-           (self->move == &scratch[4U * STATES]) && (self->P == &scratch[5U * STATES]) && (self->wide == &self->P[STATES * STATES]) && (self->product == &self->wide[STATES * STATES]);
-    return fits && (&self->record[SENSORS - 1U].gain[STATES] == &real[FUSION_REALS]);
-}
-
 /** What starts is a filter that samples can leave, with valid tables alone; its parts share its memory without a gap. Null pointers are refused.
  *  STATES states, SENSORS sensors, DEPTH past samples; tables of any content.
  *  @proves hg_fusion_start hg_fusion_valid
- *  @run check real=f32 unwind=6 limit=90 STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
  *  @run deep real=f64 unwind=6 limit=90 STATES=1U SENSORS=2U DEPTH=2U MODULUS=256U ANY_NUMBERS */
 void proof_fusion_start(void)
 {
@@ -30,26 +15,31 @@ void proof_fusion_start(void)
     hg_fusion self;
     prove((hg_fusion_start(NULL, &config, &memory) == HG_E_ARGUMENT) && (hg_fusion_start(&self, NULL, &memory) == HG_E_ARGUMENT) && (hg_fusion_start(&self, &config, NULL) == HG_E_ARGUMENT),
           "null pointers");
+    prove(ensures_fusion_valid(&config, hg_fusion_valid(&config)), "sizes that the library is made for");
+    assume(requires_fusion_start(&config, &memory));
     const hg_status status = hg_fusion_start(&self, &config, &memory);
-    prove(status == (hg_fusion_valid(&config) ? HG_OK : HG_E_CONFIG), "what is valid starts");
+    prove(ensures_fusion_start(&self, &config, &memory, status), "what is valid starts, as samples can leave it, no number twice");
     if (status == HG_OK) {
-        prove(started_fusion(&self) && (self.held == 0U) && (!self.open), "as samples can leave it");
-        prove(in_order(&self, memory.real), "no number twice");
+        prove(&self.record[SENSORS - 1U].gain[STATES] == &memory.real[FUSION_REALS], "to the last one");
         reach("a start");
     }
 }
 
 /** A filter takes any measurements, stamps and counters, NaN and infinity among them, in any state, and is again one that samples can leave; a value twice, of a sample that is not held, or
  *  out of range is refused.
- *  STATES states, SENSORS sensors, DEPTH past samples, counters of up to MODULUS values; any tables that hg_fusion_valid() accepts, whatever a frame can say.
+ *  STATES states, SENSORS sensors, DEPTH past samples, the newest in place NEWEST of them, above DEPTH: in any; counters of up to MODULUS values; any tables that hg_fusion_valid() accepts, whatever a frame can say.
  *  @proves hg_fusion_due hg_fusion_receive hg_fusion_unwrap hg_fusion_local hg_fusion_number hg_fusion_recall hg_fusion_exclude hg_fusion_alive
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run check real=f32 unwind=4 limit=90 hg_fusion_recall.0:9 STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES */
+ *  @run check real=f32 unwind=6 limit=90 hg_fusion_recall.0:9 NEWEST=9U STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 hg_fusion_recall.0:9 NEWEST=0U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 hg_fusion_recall.0:9 NEWEST=1U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 hg_fusion_recall.0:9 NEWEST=2U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES */
 void proof_fusion_frame(void)
 {
     const hg_fusion_config config = any_fusion_config();
     assume(hg_fusion_valid(&config));
     hg_fusion self = any_fusion(&config);
+    self.newest = (NEWEST <= DEPTH) ? NEWEST : any_u8();
     assume(started_fusion(&self));
     const uint8_t i = any_u8_in(0U, SENSORS - 1U);
     const uint8_t stamp = any_u8();
@@ -86,7 +76,7 @@ void proof_fusion_frame(void)
 /** A filter begun again holds no sample, and is one that samples can leave.
  *  As above; any state.
  *  @proves hg_fusion_reset
- *  @run check real=f32 unwind=6 limit=90 STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES */
+ *  @run check real=f32 unwind=37 limit=90 STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES */
 void proof_fusion_reset(void)
 {
     const hg_fusion_config config = any_fusion_config();
@@ -104,12 +94,16 @@ void proof_fusion_reset(void)
  *  As above; any state.
  *  @proves hg_fusion_open
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
- *  @run check real=f32 unwind=6 limit=90 STATES=1U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES */
+ *  @run check real=f32 unwind=6 limit=90 NEWEST=9U STATES=1U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 NEWEST=0U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 NEWEST=1U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 NEWEST=2U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES */
 void proof_fusion_open(void)
 {
     const hg_fusion_config config = any_fusion_config();
     assume(hg_fusion_valid(&config));
     hg_fusion self = any_fusion(&config);
+    self.newest = (NEWEST <= DEPTH) ? NEWEST : any_u8();
     assume(started_fusion(&self));
     const hg_fusion before = self;
     const hg_status status = hg_fusion_open(&self, NULL);
@@ -173,18 +167,21 @@ void proof_consistency(void)
     config.least = any_bool() ? least : NULL;
     const hg_consistency_memory memory = {.sum = sum, .sensor = sensor, .real = real};
     hg_consistency self;
+    assume(requires_consistency_start(&config, &fusion, &memory));
     const hg_status started = hg_consistency_start(&self, &config, &fusion, &memory);
-    prove((started == HG_OK) || (started == HG_E_CONFIG), "no other status");
+    prove(ensures_consistency_start(&self, &config, &fusion, &memory, started), "as samples can leave it");
     prove((hg_consistency_start(NULL, &config, &fusion, &memory) == HG_E_ARGUMENT) && (hg_consistency_start(&self, NULL, &fusion, &memory) == HG_E_ARGUMENT) &&
               (hg_consistency_start(&self, &config, NULL, &memory) == HG_E_ARGUMENT) && (hg_consistency_start(&self, &config, &fusion, NULL) == HG_E_ARGUMENT),
           "null pointers");
     assume(started == HG_OK);
-    prove((self.next == real) && (self.f == &real[STATES]), "its parts, one after another");
     hg_real next[STATES];
     hg_real f[ONSETS * SENSORS * STATES];
     self.next = next;
     self.f = f;
+    const hg_consistency begun = self;
+    assume(requires_consistency_reset(&self));
     hg_consistency_reset(&self);
+    prove(ensures_consistency_reset(&self, &begun), "begun again");
     self.onset = any_u8();
     self.since = any_u8();
     self.leader = any_u8();

@@ -28,42 +28,13 @@ static void any_tracker(hg_tracker *self, const hg_tracker_config *config)
     assume(started_tracker(self));
 }
 
-/** A node starts with a sample open and links that have seen nothing, and is one that frames can leave; null pointers and tables that contradict one another are refused.
- *  STATES states, SENSORS sensors, DEPTH past samples; tables of any content.
- *  @proves hg_tracker_start
- *  @stub hg_fusion_open
- *  @without conversion unsigned-overflow: bytes are cut on purpose, sample indices are meant to wrap
- *  @run deep real=f32 unwind=17 limit=1800 hg_e2e_valid.0:65 STATES=1U SENSORS=1U DEPTH=1U ANY_SHARES */
-void proof_tracker_start(void)
-{
-    const hg_tracker_config *config = any_tracker_config();
-    const hg_start how = any_bool() ? HG_START_REST : HG_START_MOVING;
-    const hg_tracker_memory memory = {
-        .fusion = {.slot = any_array(hg_fusion_slot, SLOTS), .entry = any_array(hg_fusion_entry, SLOTS * SENSORS), .sensor = any_array(hg_fusion_sensor, SENSORS),
-                   .record = any_array(hg_fusion_record, SENSORS), .origin = any_array(int32_t, STATES), .real = any_array(hg_real, FUSION_REALS)},
-        .consistency = {.sum = any_array(hg_consistency_sum, SENSORS), .sensor = any_array(hg_consistency_sensor, SENSORS), .real = any_array(hg_real, HG_CONSISTENCY_REALS(STATES, SENSORS, 1U))},
-        .link = any_array(hg_link, SENSORS + 1U),
-        .real = any_array(hg_real, 2U * STATES)};
-    hg_tracker self;
-    prove((hg_tracker_start(NULL, config, &memory, how) == HG_E_ARGUMENT) && (hg_tracker_start(&self, NULL, &memory, how) == HG_E_ARGUMENT) &&
-              (hg_tracker_start(&self, config, NULL, how) == HG_E_ARGUMENT),
-          "null pointers");
-    const hg_status status = hg_tracker_start(&self, config, &memory, how);
-    prove((status == HG_OK) || (status == HG_E_CONFIG), "no other status");
-    prove((status != HG_OK) || started_tracker(&self), "as frames can leave it");
-    prove((status != HG_OK) || ((self.k == 0U) && (self.due == 0U) && (!self.link[SENSORS].receiver.seen)), "nothing seen");
-    if (status == HG_OK) {
-        reach("a start");
-    }
-}
-
 /** What the application's clock says leaves a node as frames can leave it: a tick that is overdue makes a step due, an outage forgets what was known, and only how far ahead a tick may be is
  *  taken over.
  *  As above; any state, any clock.
  *  @proves hg_tracker_expect hg_tracker_overdue hg_tracker_outage hg_tracker_health
- *  @stub hg_fusion_open hg_fusion_reset
+ *  @stub hg_fusion_valid hg_fusion_open hg_fusion_reset
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap
- *  @run check real=f32 unwind=17 limit=90 STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES */
+ *  @run check real=f32 unwind=37 limit=90 STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES */
 void proof_tracker_clock(void)
 {
     const hg_tracker_config *config = any_tracker_config();
@@ -88,11 +59,11 @@ void proof_tracker_clock(void)
  *  are again as frames can leave them.
  *  As above; a frame of any kind, length and bytes in any state: with the identifier of sensor FROM, FROM = SENSORS: of the tick, above: of none.
  *  @proves hg_tracker_receive
- *  @stub hg_fusion_local hg_fusion_unwrap hg_fusion_receive hg_fusion_open hg_fusion_reset hg_e2e_check hg_frame_matches hg_frame_unpack
+ *  @stub hg_fusion_valid hg_fusion_local hg_fusion_unwrap hg_fusion_receive hg_fusion_open hg_fusion_reset hg_e2e_check hg_frame_matches hg_frame_unpack
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes are cut on purpose
- *  @run check real=f32 unwind=17 limit=90 hg_e2e_valid.0:65 FROM=0U STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES
- *  @run check real=f32 unwind=17 limit=90 hg_e2e_valid.0:65 FROM=2U STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES
- *  @run check real=f32 unwind=17 limit=90 hg_e2e_valid.0:65 FROM=3U STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES */
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=0U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=5U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=6U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES */
 void proof_tracker_receive(void)
 {
     const hg_tracker_config *config = any_tracker_config();
@@ -120,9 +91,9 @@ void proof_tracker_receive(void)
 /** A step that is due gives a verdict that there is and opens the next sample; one that is not due gives nothing. What is reported of it are at most two frames, and a digest ends.
  *  As above; any state.
  *  @proves hg_tracker_step hg_tracker_report hg_tracker_estimate hg_tracker_digest
- *  @stub hg_fusion_close hg_fusion_open hg_consistency_step hg_linalg_root hg_frame_pack hg_e2e_protect
+ *  @stub hg_fusion_valid hg_fusion_close hg_fusion_open hg_consistency_step hg_linalg_root hg_frame_pack hg_e2e_protect
  *  @without conversion unsigned-overflow: sample indices, stamps and the digest are meant to wrap, bytes are cut on purpose
- *  @run check real=f32 unwind=17 limit=90 hg_e2e_valid.0:65 STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES */
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES */
 void proof_tracker_step(void)
 {
     const hg_tracker_config *config = any_tracker_config();
@@ -149,11 +120,16 @@ void proof_tracker_step(void)
 }
 
 /** A sensor's node sends only in a sample that is known, and only what can be sent; its counter stays in range.
- *  As above; any reading, NaN and infinity among them, any state.
+ *  As above; the sender of sensor FROM, FROM = SENSORS: of none; any reading, NaN and infinity among them, any state. Of the filter's tables only that hg_fusion_valid() accepts them.
  *  @proves hg_fusion_sender_start hg_fusion_sender_step
- *  @stub hg_fusion_due hg_fusion_local hg_frame_pack hg_e2e_protect
+ *  @stub hg_fusion_valid hg_fusion_due hg_fusion_local hg_frame_pack hg_e2e_protect
  *  @without conversion: bytes are cut on purpose
- *  @run deep real=f32 unwind=17 limit=300 hg_e2e_valid.0:65 STATES=1U SENSORS=2U DEPTH=1U ANY_SHARES */
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=0U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=1U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=2U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=3U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=4U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=5U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES */
 void proof_fusion_sender(void)
 {
     const hg_tracker_config *config = any_tracker_config();
@@ -161,11 +137,12 @@ void proof_fusion_sender(void)
     hg_fusion_sender self;
     assume(hg_fusion_valid(config->fusion));
     any_tracker(&tracker, config);
-    const uint8_t sensor = any_u8();
+    const uint8_t sensor = (FROM < SENSORS) ? FROM : any_u8_in(SENSORS, UINT8_MAX);
     prove((hg_fusion_sender_start(NULL, &tracker, sensor) == HG_E_ARGUMENT) && (hg_fusion_sender_start(&self, NULL, sensor) == HG_E_ARGUMENT), "null pointers");
     const hg_status started = hg_fusion_sender_start(&self, &tracker, sensor);
-    prove(started == ((sensor < SENSORS) ? HG_OK : HG_E_ARGUMENT), "a sensor that there is");
-    if (started == HG_OK) {
+    prove(started == ((FROM < SENSORS) ? HG_OK : HG_E_ARGUMENT), "a sensor that there is");
+    bool ends = FROM >= SENSORS;
+    if (!ends) {
         hg_can_frame frame;
         hg_real y;
         hg_real dice;
@@ -175,8 +152,9 @@ void proof_fusion_sender(void)
         prove((status == HG_OK) || (status == HG_E_EMPTY) || (status == HG_E_NUMERIC) || (status == HG_E_STATE), "no other status");
         prove((status != HG_OK) || (tracker.synchronised && (tracker.due == 0U)), "in a sample that is known");
         prove((self.counter < config->fusion->modulus) && ((status != HG_OK) || (frame.id == sensor)), "a counter in range, a frame of the sensor's");
-        if (status == HG_OK) {
-            reach("a frame");
-        }
+        ends = status == HG_OK;
+    }
+    if (ends) {
+        reach("a frame, or no sender");
     }
 }
