@@ -4,7 +4,7 @@
 #ifndef HULLGUARD_ANY_DETECTOR_H
 #define HULLGUARD_ANY_DETECTOR_H
 
-#include "stubs.h"
+#include "state_detector.h"
 
 #define SIGNALS (GROUPS * WIDTH)
 #define DERIVED ((PREDICTORS * WIDTH) + STATES)
@@ -16,8 +16,6 @@
 #define RESIDUES ((GENERATORS * RESIDUALS) + BANKS + (HG_STATISTICS * POLYNOMIALS))
 #define LIFTED_RING 4U /* C(2 + 1 + 1, 1) */
 #define STATISTIC_REALS (HG_POLYNOMIAL_REALS(1U, 1U, 1U, 1U, LIFTED_RING) + 2U)
-/* No array has no place. */
-#define PLACES(n) (((n) > 0U) ? (n) : 1U)
 
 /* Tables of any content for these sizes. */
 static hg_matrix any_matrix(uint8_t rows, uint8_t cols)
@@ -145,62 +143,9 @@ static hg_detector_config any_detector_config(void)
         .history = HISTORY, .window = HISTORY, .residuals = RESIDUES, .codes = 2U * SIGNALS};
 }
 
-/* Parts in any state that samples can leave, each with memory of its own: what runs over the end of one is outside. */
-static hg_hold *started_holds(const hg_detector_config *config)
-{
-    hg_hold *hold = any_array(hg_hold, GROUPS);
-    for (uint8_t i = 0U; i < GROUPS; i++) {
-        int32_t *code = any_array(int32_t, 2U * WIDTH);
-        hg_real *real = any_array(hg_real, 2U * WIDTH);
-        hold[i] = (hg_hold){.config = &config->hold[i], .sent = code, .previous = &code[WIDTH], .value = real, .promise = &real[WIDTH], .age = any_u8(), .good = any_u8(), .level = any_u8(), .silence = any_u8(), .holes = any_bool(), .seen = any_bool(),
-                            .recovering = any_bool(), .fresh = any_bool(), .lost = any_bool(), .doubt = any_bool(), .gap = any_bool(), .gap_age = any_u8()};
-    }
-    return hold;
-}
-
-static hg_detector_memory started_parts(const hg_detector_config *config)
-{
-    hg_detector_memory part = {.hold = started_holds(config), .predict = any_array(hg_predict, PLACES(PREDICTORS)), .residual = any_array(hg_residual, GENERATORS),
-                               .hull = any_array(hg_hull, GENERATORS), .zonotope = any_array(hg_zonotope, GENERATORS), .bank = any_array(hg_bank, PLACES(BANKS)),
-                               .alarm = any_array(hg_alarm, JUDGES)};
-    for (uint8_t i = 0U; i < PREDICTORS; i++) {
-        part.predict[i] = (hg_predict){.config = &config->predict[i], .x = any_array(hg_real, 1U), .next = any_array(hg_real, 1U), .u = any_array(hg_real, 1U), .y = any_array(hg_real, WIDTH),
-                                       .k = any_u16(), .sure = any_bool()};
-    }
-    for (uint8_t g = 0U; g < GENERATORS; g++) {
-        hg_real size;
-        part.residual[g] = (hg_residual){.config = &config->residual[g], .z = any_array(hg_real, 1U), .next = any_array(hg_real, 1U), .input = any_array(hg_real, 1U)};
-#if COLUMNS == 0U
-        part.hull[g] = (hg_hull){.config = &config->hull[g], .theta = any_array(hg_real, RESIDUALS), .mode = NULL, .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
-        (void)size;
-#else
-        part.zonotope[g] = (hg_zonotope){.config = &config->zonotope[g], .column = any_array(hg_real, COLUMNS + 2U), .score = any_array(hg_real, COLUMNS + 2U), .spread = any_array(hg_real, 1U),
-                                         .scratch = any_array(hg_real, 1U), .size = size, .count = any_u16(), .lost = any_u16(), .k = any_u16(), .how = (hg_start)any_u8_in(0U, 1U)};
-#endif
-    }
-    part.polynomial = any_array(hg_statistic, PLACES(POLYNOMIALS));
-    for (uint8_t p = 0U; p < POLYNOMIALS; p++) {
-        hg_statistic *statistic = &part.polynomial[p];
-        (void)hg_statistic_start(statistic, &config->polynomial[p], any_array(hg_real, STATISTIC_REALS));
-        statistic->samples = any_u8();
-    }
-    for (uint8_t b = 0U; b < BANKS; b++) {
-        part.bank[b] = (hg_bank){.config = &config->bank[b], .sum = any_array(hg_acc, 2U), .k = any_u8(), .closest = 0U};
-    }
-    for (uint8_t g = 0U; g < JUDGES; g++) {
-        part.alarm[g] = (hg_alarm){.state = (hg_plant)any_u8_in(HG_PLANT_NONE, HG_PLANT_CONFIRMED), .up = any_u8(), .down = any_u8(), .pending = any_u8()};
-    }
-    return part;
-}
-
 static hg_detector any_detector(const hg_detector_config *config)
 {
-    hg_detector self = {.config = config, .memory = started_parts(config), .radii = {.data = any_array(hg_real, HISTORY * ALL), .width = ALL, .length = HISTORY, .newest = any_u8()},
-                        .values = {.data = any_array(hg_real, HISTORY * SIGNALS), .width = SIGNALS, .length = HISTORY, .newest = any_u8()},
-                        .value = any_array(hg_real, ALL), .r = any_array(hg_real, RESIDUES), .J = any_array(hg_real, RESIDUES), .past = any_array(hg_real, ALL), .refusals = any_u32(),
-                        .samples = any_u8(), .beginnings = any_u32()};
-    self.radius = self.radii.data;
-    self.decision = (hg_decision){.config = &config->decision, .alarm = self.memory.alarm, .left = any_u32()};
+    hg_detector self = state_of_detector(config);
     assume(started_detector(&self));
     return self;
 }

@@ -1,0 +1,83 @@
+/** @file
+ *  The shipped models at their own sizes: firmware/models/MODEL.c. */
+#include "state_detector.h"
+
+#define TEXT_OF(x) #x
+#define TEXT(x) TEXT_OF(x)
+#define JOIN_OF(a, b, c) a##b##c
+#define JOIN(a, b, c) JOIN_OF(a, b, c)
+
+/* The tables are part of the proof, so that every size is a constant. */
+#define SOURCE TEXT(MODEL.c)
+#include SOURCE
+
+/** A step at the sizes of a shipped model is one that its parts were proven to allow: no undefined behaviour, a finding that there is, no past rewritten that is not kept; a detector is again
+ *  one that samples can leave.
+ *  All groups, generators, banks and rows of the model, with its own tables; any state, any numbers.
+ *  @proves hg_detector_step
+ *  @stub hg_hold_step hg_hold_past hg_hold_rewrite hg_predict_step hg_mismatch_step hg_mismatch_grow hg_residual_step hg_hull_reset hg_hull_step
+ *  @stub hg_zonotope_reset hg_zonotope_widen hg_zonotope_step hg_bank_reset hg_bank_step hg_statistic_step
+ *  @without conversion unsigned-overflow: bits of groups are cut on purpose, the beginnings are meant to wrap
+ *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=platoon ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=platoon_bank ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=suspension ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=suspension_published ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
+void proof_shipped_step(void)
+{
+    const hg_detector_config *config = JOIN(hg_, MODEL, _config).detector;
+    hg_detector self = state_of_detector(config);
+    assume(started_detector(&self));
+    const hg_detector before = self;
+    hg_finding finding;
+    const hg_status status = hg_detector_step(&self, &finding);
+    prove(ensures_detector_step(&self, &before, &finding, status), "a finding that there is");
+    prove(started_detector(&self), "a state that samples can leave");
+    if (finding.plant == HG_PLANT_CONFIRMED) {
+        reach("an alarm");
+    }
+}
+
+/** Every hold, generator and bank of a shipped model takes a sample at its own sizes and is again one that samples can leave.
+ *  As above.
+ *  @proves hg_residual_step hg_hull_step hg_bank_step hg_hold_step
+ *  @without conversion unsigned-overflow: bits are cut on purpose, the beginnings are meant to wrap
+ *  @run deep real=f32 unwind=35 limit=300 write_reals.0:1000 MODEL=platoon ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=35 limit=300 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
+void proof_shipped_parts(void)
+{
+    const hg_detector_config *config = JOIN(hg_, MODEL, _config).detector;
+    hg_detector self = state_of_detector(config);
+    assume(started_detector(&self));
+    for (uint8_t i = 0U; i < config->groups; i++) {
+        hg_hold *hold = &self.memory.hold[i];
+        const uint8_t width = config->hold[i].trigger->width;
+        hg_real *value = any_array(hg_real, PLACES(width));
+        hg_real *radius = any_array(hg_real, PLACES(width));
+        uint8_t rewind;
+        const hg_hold before = *hold;
+        hg_hold_step(hold, value, radius, &rewind);
+        prove(ensures_hold_step(hold, &before, rewind), "a value and a radius");
+    }
+    for (uint8_t g = 0U; g < config->generators; g++) {
+        hg_residual *residual = &self.memory.residual[g];
+        hg_hull *hull = &self.memory.hull[g];
+        hg_real *r = any_array(hg_real, config->residual[g].residuals);
+        hg_real *J = any_array(hg_real, config->residual[g].residuals);
+        const hg_residual before = *residual;
+        const hg_hull earlier = *hull;
+        const hg_status status = hg_residual_step(residual, self.value, r);
+        prove(ensures_residual_step(residual, &before, status), "a residual");
+        hg_hull_step(hull, &self.radii, J);
+        prove(ensures_hull_step(hull, &earlier), "a threshold");
+    }
+    for (uint8_t b = 0U; b < config->banks; b++) {
+        hg_bank *bank = &self.memory.bank[b];
+        hg_real r;
+        hg_real J;
+        const hg_bank before = *bank;
+        const hg_status status = hg_bank_step(bank, &self.values, &self.radii, &r, &J);
+        prove(ensures_bank_step(bank, &before, status), "a judgement");
+    }
+    reach("end");
+}
