@@ -114,9 +114,9 @@ void proof_digest_take(void)
  *  @stub hg_digest_bytes hg_digest_halves hg_digest_codes hg_digest_masks hg_digest_reals
  *  @stub hg_crc32c
  *  @without conversion unsigned-overflow: flags and exponents go as words of 32 bits
- *  @run check real=f32 unwind=25 limit=90 PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U POLYNOMIALS=0U
+ *  @run check real=f32 unwind=40 limit=90 PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U POLYNOMIALS=0U
  *  @run check real=f32 unwind=30 limit=90 PROTECTION=1U GROUPS=1U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U POLYNOMIALS=1U
- *  @run check real=f32 unwind=25 limit=90 PROTECTION=3U GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=1U POLYNOMIALS=0U */
+ *  @run check real=f32 unwind=40 limit=90 PROTECTION=3U GROUPS=6U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=1U POLYNOMIALS=0U */
 void proof_digest_node(void)
 {
     const hg_node_config *config = any_node_config();
@@ -147,7 +147,7 @@ void proof_digest_node(void)
  *  @stub hg_digest_bytes hg_digest_halves hg_digest_codes hg_digest_masks hg_digest_reals
  *  @stub hg_crc32c
  *  @without conversion unsigned-overflow: flags and exponents go as words of 32 bits
- *  @run check real=f32 unwind=25 limit=90 GROUPS=2U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U POLYNOMIALS=0U */
+ *  @run check real=f32 unwind=40 limit=90 GROUPS=6U WIDTH=1U PREDICTORS=1U STATES=1U GENERATORS=2U RESIDUALS=1U BANKS=1U HISTORY=2U HORIZON=2U COLUMNS=0U POLYNOMIALS=0U */
 void proof_digest_uio(void)
 {
     hg_uio_config *uio = any_array(hg_uio_config, GENERATORS);

@@ -6,7 +6,7 @@
  *  GROUPS groups, the last of them the closing one, protected by PROTECTION; tables of any content.
  *  @proves hg_node_start
  *  @without conversion: bytes are cut on purpose
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:65 hg_detector_start.0:20 PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:65 hg_detector_start.0:70 PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
  *  @run deep real=f32 unwind=10 limit=90 hg_e2e_valid.0:65 hg_detector_start.0:20 PROTECTION=3U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
 void proof_node_start(void)
 {
@@ -35,7 +35,7 @@ void proof_node_start(void)
  *  @proves hg_node_expect hg_node_overdue hg_node_outage hg_node_health
  *  @stub hg_detector_restart hg_hold_start
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap
- *  @run check real=f32 unwind=10 limit=90 PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
+ *  @run check real=f32 unwind=10 limit=90 PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
 void proof_node_clock(void)
 {
     const hg_node_config *config = any_node_config();
@@ -62,14 +62,14 @@ void proof_node_clock(void)
  *  @proves hg_node_receive
  *  @stub hg_detector_receive hg_detector_restart hg_hold_start hg_e2e_check hg_frame_matches hg_frame_unpack
  *  @without conversion unsigned-overflow: sample indices and stamps are meant to wrap, bytes are cut on purpose
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=0U PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=1U PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=0U PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=5U PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
  *  @run deep real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=0U PROTECTION=2U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
  *  @run deep real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=1U PROTECTION=2U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=0U PROTECTION=3U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=1U PROTECTION=3U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=2U PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=3U PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=0U PROTECTION=3U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=5U PROTECTION=3U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=6U PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:33 FROM=7U PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
 void proof_node_receive(void)
 {
     const hg_node_config *config = any_node_config();
@@ -110,7 +110,7 @@ void proof_node_receive(void)
  *  @proves hg_node_step
  *  @stub hg_detector_receive hg_detector_step
  *  @without conversion unsigned-overflow: sample indices are meant to wrap, bits of groups are cut on purpose
- *  @run check real=f32 unwind=10 limit=90 PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
+ *  @run check real=f32 unwind=10 limit=90 PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
 void proof_node_step(void)
 {
     const hg_node_config *config = any_node_config();
@@ -130,7 +130,7 @@ void proof_node_step(void)
  *  @proves hg_node_freeze hg_node_step hg_node_receive
  *  @stub hg_detector_receive hg_detector_step hg_freeze_receive hg_freeze_step hg_freeze_report hg_e2e_check hg_frame_matches hg_frame_unpack hg_hold_start hg_detector_restart
  *  @without conversion unsigned-overflow: sample indices are meant to wrap, bits of groups are cut on purpose
- *  @run check real=f32 unwind=10 limit=90 write_reals.0:14 hg_e2e_valid.0:34 PROTECTION=1U SAMPLES=2U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
+ *  @run check real=f32 unwind=10 limit=90 write_reals.0:40 hg_e2e_valid.0:34 PROTECTION=1U SAMPLES=2U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
 void proof_node_freeze(void)
 {
     hg_node_config *config = any_node_config();
