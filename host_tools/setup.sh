@@ -31,7 +31,7 @@ packages() {
 }
 
 install_packages() {
-    local missing=$1 as_root=()
+    local missing=$1 output as_root=()
     local update="apt-get -q update"
     local install="apt-get -q install -y --no-install-recommends -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 $missing"
     if [ "$(id -u)" != 0 ]; then
@@ -41,8 +41,8 @@ install_packages() {
     say "installing system packages: $missing"
     # Unquoted on purpose: the lines are lists of words. Indexes of a third party that fail need not matter, so update may fail.
     "${as_root[@]}" $update >/dev/null || say "apt-get update had errors; going on with the package lists there are"
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive $install >/dev/null </dev/null \
-        || fail "apt-get failed; run this as root, then again what you ran: apt-get update && $install"
+    output=$("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive $install 2>&1 </dev/null) \
+        || { tail -n 20 <<<"$output" >&2; fail "apt-get failed; run this as root, then again what you ran: apt-get update && $install"; }
 }
 
 # Where there is no apt, the tools may have come some other way: name what lacks, stop only where nothing would work.

@@ -28,9 +28,13 @@ chmod 755 "$work"
 echo "deb [arch=amd64 signed-by=$keys] $mirror $release main" >"$work/sources.list"
 cat >"$work/conf" <<C
 Dir::State "$work"; Dir::State::status "$work/status"; Dir::Cache "$work"; Dir::Etc::sourcelist "$work/sources.list"; Dir::Etc::sourceparts "$work/parts";
-Dir::Cache::pkgcache ""; Dir::Cache::srcpkgcache ""; Acquire::Languages "none"; Acquire::Retries "3"; APT::Sandbox::User "$(id -un)";
+Dir::Etc::parts "$work/conf.d"; Dir::Cache::pkgcache ""; Dir::Cache::srcpkgcache ""; Acquire::Languages "none"; Acquire::Retries "3"; APT::Sandbox::User "$(id -un)";
 C
-mkdir "$work/parts"
+mkdir "$work/parts" "$work/conf.d"
+# Proxies and the like as the system has them; but not its hooks: in containers one of them empties the system's cache, under the hands of an apt that is installing from it.
+eval "$(apt-config shell system Dir::Etc::parts/d)"
+cp "$system"/* "$work/conf.d/" 2>/dev/null || true
+for hook in APT::Update::Pre-Invoke APT::Update::Post-Invoke APT::Update::Post-Invoke-Success; do echo "#clear $hook;"; done >"$work/conf.d/zzz-no-hooks"
 export APT_CONFIG="$work/conf"
 apt-get -qq -o APT::Update::Error-Mode=any update >"$work/log" 2>&1 || { cat "$work/log" >&2; fail "the list of packages of Debian $release could not be read: is there a network?"; }
 # $packages: a list of words
