@@ -27,7 +27,8 @@ void proof_fusion_start(void)
 
 /** A filter takes any measurements, stamps and counters, NaN and infinity among them, in any state, and is again one that samples can leave; a value twice, of a sample that is not held, or
  *  out of range is refused.
- *  STATES states, SENSORS sensors, DEPTH past samples, the newest in place NEWEST of them, above DEPTH: in any; counters of up to MODULUS values; any tables that hg_fusion_valid() accepts, whatever a frame can say.
+ *  STATES states, SENSORS sensors, DEPTH past samples, the newest sample in place NEWEST, above DEPTH: in any; counters of up to MODULUS values; any tables that hg_fusion_valid() accepts,
+ *  whatever a frame can say.
  *  @proves hg_fusion_due hg_fusion_receive hg_fusion_unwrap hg_fusion_local hg_fusion_number hg_fusion_recall hg_fusion_exclude hg_fusion_alive
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
  *  @run check real=f32 unwind=6 limit=90 hg_fusion_recall.0:9 NEWEST=9U STATES=2U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES
@@ -95,9 +96,9 @@ void proof_fusion_reset(void)
  *  @proves hg_fusion_open
  *  @without conversion unsigned-overflow: sample indices and counters are meant to wrap, turns and origins are rounded to integers within bounds that only the numbers know
  *  @run check real=f32 unwind=6 limit=90 NEWEST=9U STATES=1U SENSORS=2U DEPTH=1U MODULUS=256U ANY_SHARES
- *  @run deep real=f32 unwind=7 limit=1800 NEWEST=0U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
- *  @run deep real=f32 unwind=7 limit=1800 NEWEST=1U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
- *  @run deep real=f32 unwind=7 limit=1800 NEWEST=2U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES */
+ *  @run deep real=f32 unwind=7 limit=1800 copy.0:37 NEWEST=0U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 copy.0:37 NEWEST=1U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES
+ *  @run deep real=f32 unwind=7 limit=1800 copy.0:37 NEWEST=2U STATES=6U SENSORS=5U DEPTH=2U MODULUS=256U ANY_SHARES */
 void proof_fusion_open(void)
 {
     const hg_fusion_config config = any_fusion_config();

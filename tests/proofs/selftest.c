@@ -38,7 +38,8 @@ void proof_selftest_drive(void)
  *  @proves hg_selftest_run
  *  @stub hg_selftest_drive
  *  @without conversion unsigned-overflow: random numbers are meant to wrap, stamps are cut on purpose
- *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:34 LENGTH=1U PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
+ *  @run check real=f32 unwind=10 limit=90 hg_e2e_valid.0:34 LENGTH=1U PROTECTION=1U GROUPS=2U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS
+ *  @run deep real=f32 unwind=10 limit=150 hg_e2e_valid.0:34 LENGTH=1U PROTECTION=1U GROUPS=6U WIDTH=1U PREDICTORS=0U STATES=0U GENERATORS=1U RESIDUALS=1U BANKS=0U HISTORY=1U HORIZON=1U COLUMNS=0U ANY_NUMBERS */
 void proof_selftest_run(void)
 {
     const hg_node_config *config = any_node_config();

@@ -43,7 +43,7 @@ void proof_shipped_step(void)
  *  @proves hg_residual_step hg_hull_step hg_bank_step hg_hold_step
  *  @without conversion unsigned-overflow: bits are cut on purpose, the beginnings are meant to wrap
  *  @run check real=f32 unwind=35 limit=150 write_reals.0:1000 MODEL=platoon ANY_NUMBERS ANY_SUMS
- *  @run check real=f32 unwind=35 limit=150 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
+ *  @run deep real=f32 unwind=35 limit=150 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
 void proof_shipped_parts(void)
 {
     const hg_detector_config *config = JOIN(hg_, MODEL, _config).detector;

@@ -125,9 +125,9 @@ void proof_tracker_step(void)
  *  @stub hg_fusion_valid hg_fusion_due hg_fusion_local hg_frame_pack hg_e2e_protect
  *  @without conversion: bytes are cut on purpose
  *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=0U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
- *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=1U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
- *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=2U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
- *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=3U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run deep real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=1U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run deep real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=2U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
+ *  @run deep real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=3U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
  *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=4U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES
  *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 FROM=5U STATES=6U SENSORS=5U DEPTH=2U VALID=1U ANY_SHARES */
 void proof_fusion_sender(void)
