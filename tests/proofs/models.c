@@ -3,15 +3,7 @@
 #include "proof.h"
 
 #include "hullguard/node.h"
-
-#define TEXT_OF(x) #x
-#define TEXT(x) TEXT_OF(x)
-#define JOIN_OF(a, b, c) a##b##c
-#define JOIN(a, b, c) JOIN_OF(a, b, c)
-
-/* The tables are part of the proof, so that every layout is a constant. */
-#define SOURCE TEXT(MODEL.c)
-#include SOURCE
+#include "model_tables.h"
 
 /** Every measurement and control message of the model is valid, and every code that its senders can send comes out of the frame as it went in, protection and stamp beside it.
  *  All messages of the model, any codes, counter and stamp.
@@ -29,7 +21,7 @@
  *  @run deep real=f32 unwind=65 limit=600 hg_e2e_valid.0:513 MODEL=suspension_published */
 void proof_models_round(void)
 {
-    const hg_node_config *config = &JOIN(hg_, MODEL, _config);
+    const hg_node_config *config = &MODEL_CONFIG;
     for (uint8_t i = 0U; i < config->detector->groups; i++) {
         const hg_message *message = &config->message[i];
         prove(hg_frame_valid(message), "a valid message");

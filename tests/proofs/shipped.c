@@ -1,15 +1,7 @@
 /** @file
  *  The shipped models at their own sizes: firmware/models/MODEL.c. */
 #include "state_detector.h"
-
-#define TEXT_OF(x) #x
-#define TEXT(x) TEXT_OF(x)
-#define JOIN_OF(a, b, c) a##b##c
-#define JOIN(a, b, c) JOIN_OF(a, b, c)
-
-/* The tables are part of the proof, so that every size is a constant. */
-#define SOURCE TEXT(MODEL.c)
-#include SOURCE
+#include "model_tables.h"
 
 /** A step at the sizes of a shipped model is one that its parts were proven to allow: no undefined behaviour, a finding that there is, no past rewritten that is not kept; a detector is again
  *  one that samples can leave.
@@ -25,7 +17,7 @@
  *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
 void proof_shipped_step(void)
 {
-    const hg_detector_config *config = JOIN(hg_, MODEL, _config).detector;
+    const hg_detector_config *config = MODEL_CONFIG.detector;
     hg_detector self = state_of_detector(config);
     assume(started_detector(&self));
     const hg_detector before = self;
@@ -46,7 +38,7 @@ void proof_shipped_step(void)
  *  @run deep real=f32 unwind=35 limit=150 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
 void proof_shipped_parts(void)
 {
-    const hg_detector_config *config = JOIN(hg_, MODEL, _config).detector;
+    const hg_detector_config *config = MODEL_CONFIG.detector;
     hg_detector self = state_of_detector(config);
     assume(started_detector(&self));
     for (uint8_t i = 0U; i < config->groups; i++) {
