@@ -23,7 +23,7 @@ from result import write_to
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 TIMEOUT_S = 20  # of one goal; most take less than 0.1
-Z3_OPTION = "smt.auto_config=false"  # what z3 then chooses by itself ends in no time where products meet quantifiers; its own choice does not end
+Z3_OPTION = "smt.auto_config=false"  # where products meet quantifiers the tactics that z3 chooses by itself do not end
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 PROVED = re.compile(r"Proved goals:\s+(\d+) / (\d+)")
 

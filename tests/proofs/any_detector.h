@@ -143,13 +143,6 @@ static hg_detector_config any_detector_config(void)
         .history = HISTORY, .window = HISTORY, .residuals = RESIDUES, .codes = 2U * SIGNALS};
 }
 
-static hg_detector any_detector(const hg_detector_config *config)
-{
-    hg_detector self = state_of_detector(config);
-    assume(started_detector(&self));
-    return self;
-}
-
 #if COLUMNS == 0U
 #define THRESHOLD_REALS HG_HULL_REALS(RESIDUALS, 0U)
 #else

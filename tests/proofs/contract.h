@@ -597,24 +597,42 @@ static inline bool requires_fusion_start(const hg_fusion_config *config, const h
             writable(memory->origin, config->states) && writable(memory->real, HG_FUSION_REALS(config->states, config->inputs, config->sensors, config->depth)));
 }
 
-/* Its parts have their memory one after another, none twice. */
+/* Where the parts of a filter have their numbers, one after another, none twice: of a sample, the filter's own behind those of all samples, of a sensor's record behind them. */
+static inline hg_fusion_slot laid_slot(const hg_fusion_config *config, const hg_fusion_memory *memory, uint8_t place)
+{
+    const uint32_t n = config->states;
+    hg_real *real = &memory->real[place * ((n * (n + 2U)) + config->inputs)];
+    return (hg_fusion_slot){.x = real, .P = &real[n], .shift = &real[n + (n * n)], .u = &real[n * (n + 2U)], .entry = &memory->entry[(uint32_t)place * config->sensors]};
+}
+
+static inline hg_fusion laid_fusion(const hg_fusion_config *config, const hg_fusion_memory *memory)
+{
+    const uint32_t n = config->states;
+    hg_real *real = &memory->real[(config->depth + 1U) * ((n * (n + 2U)) + config->inputs)];
+    return (hg_fusion){.config = config, .slot = memory->slot, .sensor = memory->sensor, .record = memory->record, .origin = memory->origin, .x = real, .ahead = &real[n], .g = &real[2U * n],
+                       .next = &real[3U * n], .move = &real[4U * n], .P = &real[5U * n], .wide = &real[(5U + n) * n], .product = &real[(5U + (2U * n)) * n]};
+}
+
+static inline hg_real *laid_gain(const hg_fusion *laid, uint8_t i)
+{
+    const uint32_t n = laid->config->states;
+    return &laid->product[(n + i) * n];
+}
+
 static inline bool placed_fusion(const hg_fusion *self, const hg_fusion_memory *memory)
 {
     const hg_fusion_config *config = self->config;
-    const uint32_t n = config->states;
-    const hg_real *real = memory->real;
-    bool fits = (self->slot == memory->slot) && (self->sensor == memory->sensor) && (self->record == memory->record) && (self->origin == memory->origin);
+    const hg_fusion laid = laid_fusion(config, memory);
+    bool fits = (self->slot == laid.slot) && (self->sensor == laid.sensor) && (self->record == laid.record) && (self->origin == laid.origin) && (self->x == laid.x) &&
+                (self->ahead == laid.ahead) && (self->g == laid.g) && (self->next == laid.next) && (self->move == laid.move) && (self->P == laid.P) && (self->wide == laid.wide) &&
+                (self->product == laid.product);
     for (uint8_t l = 0U; l <= config->depth; l++) {
         const hg_fusion_slot *slot = &self->slot[l];
-        fits = fits && (slot->x == real) && (slot->P == &real[n]) && (slot->shift == &real[n + (n * n)]) && (slot->u == &real[n * (n + 2U)]) &&
-               (slot->entry == &memory->entry[(uint32_t)l * config->sensors]);
-        real = &real[(n * (n + 2U)) + config->inputs];
+        const hg_fusion_slot own = laid_slot(config, memory, l);
+        fits = fits && (slot->x == own.x) && (slot->P == own.P) && (slot->shift == own.shift) && (slot->u == own.u) && (slot->entry == own.entry);
     }
-    fits = fits && (self->x == real) && (self->ahead == &real[n]) && (self->g == &real[2U * n]) && (self->next == &real[3U * n]) && (self->move == &real[4U * n]) &&
-           (self->P == &real[5U * n]) && (self->wide == &real[(5U + n) * n]) && (self->product == &real[(5U + (2U * n)) * n]);
-    real = &real[(5U + (3U * n)) * n];
     for (uint8_t i = 0U; i < config->sensors; i++) {
-        fits = fits && (self->record[i].gain == &real[(uint32_t)i * n]);
+        fits = fits && (self->record[i].gain == laid_gain(&laid, i));
     }
     return fits;
 }

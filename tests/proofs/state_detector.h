@@ -97,7 +97,7 @@ static hg_alarm *state_alarms(const hg_detector_config *config)
     return alarm;
 }
 
-static hg_detector state_of_detector(const hg_detector_config *config)
+static hg_detector any_detector(const hg_detector_config *config)
 {
     hg_detector self = {.config = config,
                         .memory = {.hold = state_holds(config), .predict = state_predictors(config), .residual = state_residuals(config), .hull = state_hulls(config),
@@ -111,6 +111,7 @@ static hg_detector state_of_detector(const hg_detector_config *config)
 #endif
     self.radius = self.radii.data;
     self.decision = (hg_decision){.config = &config->decision, .alarm = self.memory.alarm, .left = any_u32()};
+    assume(started_detector(&self));
     return self;
 }
 

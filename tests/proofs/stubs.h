@@ -503,27 +503,15 @@ bool stub_hg_fusion_valid(const hg_fusion_config *config)
 }
 #endif
 
-/* Each part where placed_fusion() says. */
+/* Each part where placed_fusion() looks for it. */
 static void place_fusion(hg_fusion *self, const hg_fusion_config *config, const hg_fusion_memory *memory)
 {
-    const uint32_t n = config->states;
-    hg_real *real = memory->real;
-    *self = (hg_fusion){.config = config, .slot = memory->slot, .sensor = memory->sensor, .record = memory->record, .origin = memory->origin};
+    *self = laid_fusion(config, memory);
     for (uint8_t l = 0U; l <= config->depth; l++) {
-        self->slot[l] = (hg_fusion_slot){.x = real, .P = &real[n], .shift = &real[n + (n * n)], .u = &real[n * (n + 2U)], .entry = &memory->entry[(uint32_t)l * config->sensors]};
-        real = &real[(n * (n + 2U)) + config->inputs];
+        self->slot[l] = laid_slot(config, memory, l);
     }
-    self->x = real;
-    self->ahead = &real[n];
-    self->g = &real[2U * n];
-    self->next = &real[3U * n];
-    self->move = &real[4U * n];
-    self->P = &real[5U * n];
-    self->wide = &real[(5U + n) * n];
-    self->product = &real[(5U + (2U * n)) * n];
-    real = &real[(5U + (3U * n)) * n];
     for (uint8_t i = 0U; i < config->sensors; i++) {
-        self->record[i].gain = &real[(uint32_t)i * n];
+        self->record[i].gain = laid_gain(self, i);
     }
 }
 
@@ -534,6 +522,9 @@ hg_status stub_hg_fusion_start(hg_fusion *self, const hg_fusion_config *config, 
     if (status == HG_OK) {
         place_fusion(self, config, memory);
         write_fusion(self);
+    } else {
+        hg_fusion any; /* of a refused one nothing is promised */
+        *self = any;
     }
     assume(ensures_fusion_start(self, config, memory, status));
     return status;
@@ -638,6 +629,9 @@ hg_status stub_hg_consistency_start(hg_consistency *self, const hg_consistency_c
     if (status == HG_OK) {
         *self = (hg_consistency){.config = config, .fusion = fusion, .sum = memory->sum, .sensor = memory->sensor, .next = memory->real, .f = &memory->real[fusion->config->states]};
         write_consistency(self);
+    } else {
+        hg_consistency any; /* of a refused one nothing is promised */
+        *self = any;
     }
     assume(ensures_consistency_start(self, config, fusion, memory, status));
     return status;
