@@ -299,7 +299,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except HullguardError as error:
         print(f"hullguard: {error}", file=sys.stderr)
         return error.status
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ImportError) as error:
+        if isinstance(error, ImportError) and not isinstance(error.__cause__, KeyboardInterrupt):  # a compiled module's start makes it one
+            raise
         print("hullguard: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from scipy.signal import place_poles
 
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -240,6 +239,8 @@ def _placed(A: Array, C: Array, poles: Array, where: str) -> Array:
     """K with the eigenvalues of A - K C at `poles`."""
     if C.shape[0] == C.shape[1] and rank_of(C) == len(A) and np.all(np.isreal(poles)):
         return np.asarray((A - np.diag(poles.real)) @ np.linalg.inv(C))
+    from scipy.signal import place_poles  # half the start of every command, if it were taken in above
+
     try:
         with warnings.catch_warnings():
             # It warns that it could have made the gain less sensitive; whether the poles are where they should be is checked below.
