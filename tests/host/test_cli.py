@@ -291,11 +291,14 @@ def test_ctrl_c_ends_a_campaign_with_one_line() -> None:
     command = [sys.executable, "-m", "hullguard", "campaign", "platoon", "--scenario", "rest", "--runs", "2000000", "--workers", "2", "-q"]
     # A shell's background jobs ignore the signal, and so would all that they start.
     hears = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    before = time.monotonic()
+    subprocess.run([*command[:4], "--help"], check=True, stdout=subprocess.DEVNULL)
+    start = time.monotonic() - before
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=hears)
-    time.sleep(5.0)
+    time.sleep(max(5.0, 5.0 * start))  # its workers are at work
     os.killpg(process.pid, signal.SIGINT)
     try:
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=100)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)

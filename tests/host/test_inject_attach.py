@@ -347,7 +347,7 @@ def live(cli: Cli, feed: Callable[[], None], *arguments: object) -> Any:
     helper = threading.Thread(target=work, daemon=True)
     helper.start()
     result = cli("inject", *arguments)
-    helper.join(10)
+    helper.join(100)
     problem = box.get(timeout=1)
     assert problem is None, problem
     return result

@@ -91,7 +91,7 @@ def screen(view: View) -> list[str]:
 
 
 async def until(condition: Callable[[], bool], pilot: Pilot[None]) -> None:
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 100.0
     while not condition():
         assert time.monotonic() < end
         await pilot.pause(0.02)
@@ -257,7 +257,7 @@ class Terminal:
         self.before = termios.tcgetattr(other)
         self._other = other
 
-    def read(self, condition: Callable[[], bool], for_s: float = 30.0) -> None:
+    def read(self, condition: Callable[[], bool], for_s: float = 100.0) -> None:
         end = time.monotonic() + for_s
         while not condition():
             assert time.monotonic() < end, self.out[-3000:].decode(errors="replace")
@@ -316,7 +316,7 @@ def test_lines_end_with_ctrl_c(folder: Path) -> None:
         assert process.stdout is not None and process.stderr is not None
         first = [process.stdout.readline() for _ in range(8)]
         process.send_signal(signal.SIGINT)
-        rest, err = process.communicate(timeout=20)
+        rest, err = process.communicate(timeout=100)
     assert all(x.startswith("event=") for x in first)
     assert process.returncode == 0 and err == "" and rest.splitlines()[-1].startswith("event=end")
 

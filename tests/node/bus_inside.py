@@ -576,7 +576,7 @@ def test_two_nodes_on_one_bus(ecu: Under) -> None:
 
 def test_plant_by_hand(ecu: Under) -> None:
     with ecu.start():
-        plant = command(hullguard("plant", "platoon", "-i", "socketcan", "-c", "vcan0", "--lockstep", "--speed", "max", "--json"), timeout_s=30)
+        plant = command(hullguard("plant", "platoon", "-i", "socketcan", "-c", "vcan0", "--lockstep", "--speed", "max", "--json"))
     assert plant.returncode == 0, plant.stderr
     result = json.loads(plant.stdout)
     assert result["faults"][0]["confirmed_at"] is not None and result["false_alarms"] == {"provisional": 0, "confirmed": 0}

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from hullguard.bus import candump
 from hullguard.cli import main
-from inside_support import detect
+from inside_support import WAIT_S, detect
 from node_support import SEED
 
 STAMP = re.compile(r"^\(\d{10}\.\d{6}\) ")
@@ -67,7 +67,7 @@ def test_canplayer_into_detect(model: str, recorded: dict[str, Path], tmp_path: 
     result = json.loads((recorded[model] / "run.json").read_text())
     options = ("-i", "socketcan", "-c", "vcan0", "--rest", "--lockstep", "--listen", "--ready", "--json", "--samples", result["samples"])
     with detect(model, *options) as n:
-        subprocess.run(["canplayer", "-I", str(fast)], check=True, timeout=30)
+        subprocess.run(["canplayer", "-I", str(fast)], check=True, timeout=WAIT_S)
         n.wait(30)
     assert n.status == 0, n.err
     told = json.loads(n.lines[-1])
@@ -80,7 +80,7 @@ def test_canplayer_keeps_the_runs_pace(recorded: dict[str, Path], tmp_path: Path
     first = [line for line, e in zip((recorded["platoon"] / "run.log").read_text().splitlines(), candump.read(recorded["platoon"] / "run.log"), strict=True) if e.time_s < 2.05]
     (tmp_path / "short.log").write_text("\n".join(first) + "\n")
     began = time.monotonic()
-    subprocess.run(["canplayer", "-I", str(tmp_path / "short.log")], check=True, timeout=30)
+    subprocess.run(["canplayer", "-I", str(tmp_path / "short.log")], check=True, timeout=WAIT_S)
     assert 1.5 < time.monotonic() - began < 10
 
 

@@ -27,7 +27,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if not session.config.option.collectonly and any("timing_files" in getattr(item, "fixturenames", ()) for item in session.items):
         out = Path(tempfile.mkdtemp(prefix="hullguard-timing-"))
         runs = [f"{name}:{ticks}:{drop}" for name, (ticks, drop) in TICKS.items()]
-        command = in_guest("sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=150)
+        command = in_guest("sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=300)
         _started.append((subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment()), out))
 
 
@@ -45,7 +45,7 @@ def pytest_sessionfinish() -> None:
 def timing_files() -> Iterator[Path]:
     """Folder with the files of the runs in real time."""
     process, out = _started[0]
-    said, _ = process.communicate(timeout=170)
+    said, _ = process.communicate(timeout=330)
     assert process.returncode == 0, f"exit status {process.returncode}: {said}"
     yield out
 

@@ -20,7 +20,7 @@ from hullguard.bus.candump import BRS, ERROR, EXTENDED, FD, REMOTE, Entry
 from hullguard.cli import main
 from hullguard.core.library import library
 from hullguard.core.native import Frame, frame_bits
-from inside_support import link, recorded
+from inside_support import WAIT_S, link, recorded
 from node_support import SEED
 
 EVERYTHING = "vcan0,0:0,#FFFFFFFF"  # error frames too
@@ -63,7 +63,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Entry], Path]
             assert line, "dumpcap does not capture"
         for name, options in (("plain.log", ("-L",)), ("extra.log", ("-L", "-x")), ("silent", ("-l",))):
             stack.enter_context(recorded(folder / name, "candump", *options, EVERYTHING, filters=2))
-        subprocess.run(["canplayer", "-I", str(folder / "run.log")], check=True, timeout=30)
+        subprocess.run(["canplayer", "-I", str(folder / "run.log")], check=True, timeout=WAIT_S)
     return many, folder
 
 

@@ -15,7 +15,7 @@ from hullguard.freeze.reader import Reader
 from hullguard.freeze.record import decode
 from hullguard.model import parse_fault
 from hullguard.plant.run import OnCan, Pace, Run
-from inside_support import link, node, ready
+from inside_support import WAIT_S, link, node, ready
 from node_support import SEED
 
 MODEL = "platoon_bank"
@@ -92,7 +92,7 @@ def test_reading_does_not_disturb_detection() -> None:
         def reads() -> None:
             with link() as second:
                 reader = Reader(library(), second, table)
-                state, end = reader.state(), time.monotonic() + 60.0
+                state, end = reader.state(), time.monotonic() + WAIT_S
                 while state.state != "frozen" and time.monotonic() < end:
                     time.sleep(0.05)
                     state = reader.state()
@@ -101,7 +101,7 @@ def test_reading_does_not_disturb_detection() -> None:
         thread = threading.Thread(target=reads)
         thread.start()
         run.samples(source, 160)  # in lockstep: every verdict is compared with this process's
-        thread.join(60.0)
+        thread.join(WAIT_S)
         assert run.mismatch is None
         assert read == [words_here(run)]
 

@@ -14,12 +14,11 @@ from pathlib import Path
 
 from hullguard.bus.link import CanLink
 from hullguard.core.native import Frame
-from inside_support import Drive, exchange, link, node
+from inside_support import WAIT_S, Drive, exchange, link, node
 from node_support import environment
 
 STRANGER = 0x7F0
 SLOTS = 16000  # frames that overflow the largest receive buffer that the monitor can get
-WAIT_S = 20.0
 
 Line = dict[str, str]
 

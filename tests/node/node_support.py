@@ -42,7 +42,7 @@ def in_guest(*arguments: object, interfaces: int = 1, timeout_s: int = 100) -> l
     return [str(WITH_VCAN), "-n", str(interfaces), "-t", str(timeout_s), *map(str, arguments)]
 
 
-def run_inside(*files: str, out: Path, interfaces: int = 1, timeout_s: int = 300) -> str:
+def run_inside(*files: str, out: Path, interfaces: int = 1, timeout_s: int = 600) -> str:
     """Run the tests of files where vcan0 exists, and give what they printed; what fails there fails here, with its text."""
     options = ["-q", "-rfEP", "--tb=short", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--durations=5", f"--basetemp={out}/inside"]
     done = command(in_guest(sys.executable, "-m", "pytest", *options, *(HERE / f for f in files), interfaces=interfaces, timeout_s=timeout_s), timeout_s + 30)

@@ -77,7 +77,7 @@ ON_BUS = ("-i", "socketcan", "-c", "vcan0")
 
 def test_plant_and_detect_by_hand() -> None:
     with detect("platoon", *ON_BUS, "--lockstep", "--rest", "--ready", "--json") as n:
-        plant = command(hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--json"), timeout_s=30)
+        plant = command(hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--json"))
         n.stop()
     assert plant.returncode == 0, plant.stderr
     result = json.loads(plant.stdout)
@@ -90,7 +90,7 @@ def test_plant_and_detect_by_hand() -> None:
 
 def test_plant_notices_a_node_that_says_something_else() -> None:
     with node("--lockstep"):  # without --rest it knows less
-        plant = command(hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--scenario", "rest"), timeout_s=30)
+        plant = command(hullguard("plant", "platoon", *ON_BUS, "--lockstep", "--speed", "max", "--scenario", "rest"))
     assert plant.returncode == 1
     assert re.fullmatch(r"hullguard: the node's verdicts differ[^\n]*\n", plant.stderr)
 

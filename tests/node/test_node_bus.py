@@ -8,4 +8,4 @@ from node_support import run_inside
 
 
 def test_a_node_on_vcan(tmp_path: Path) -> None:
-    run_inside("bus_inside.py", out=tmp_path, interfaces=2, timeout_s=200)
+    run_inside("bus_inside.py", out=tmp_path, interfaces=2)
