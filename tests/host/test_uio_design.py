@@ -310,7 +310,8 @@ def test_sensors_that_tell_every_state_are_an_observer() -> None:
             u, f = rng.standard_normal(1), rng.standard_normal(2)
             v = np.concatenate([C @ x, u])
             estimate, s = e.output @ s + e.direct @ v, e.state @ s + e.input @ v
-            assert np.allclose(estimate, [*(low + before), *x], rtol=1e-6, atol=1e-6 * np.abs(before).max())
+            rounding = 1e-15 * np.linalg.cond(C) * np.linalg.norm(d.P) * np.linalg.norm(x)  # of the states, times what makes disturbances of them
+            assert np.allclose(estimate, [*(low + before), *x], rtol=1e-6, atol=10.0 * rounding)
             x, low, before = Ad @ x + BG @ np.concatenate([u, f]), low + a * (f - low), (1 - a) * before
 
 
