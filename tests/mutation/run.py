@@ -3,7 +3,8 @@
 
 FOLDER/BUILD holds the objects of the library and the test programs (mutation.mk). All mutants of a file are compiled at once (mutate.py); a test program is
 started once and forks for each (runtime.c). A mutant is killed when a program that comes by it fails, crashes or takes many times its usual time. What survives is
-an error unless equivalent.toml explains it, and so is an entry there that explains nothing.
+an error unless equivalent.toml explains it, and so is an entry there that explains nothing. The functions of a header are mutated in every file of the library
+that takes it in, and in the tests that call them.
 """
 
 import argparse
@@ -28,6 +29,9 @@ except ImportError as missing:
     sys.exit(f"{missing}: run host_tools/setup.sh check")
 
 HERE = Path("tests/mutation")
+SOURCES = Path("firmware/src")
+HEADERS = Path("firmware/include/hullguard")
+UNIT = Path("tests/unit")
 TIMES = 4.0  # of a program's usual time that a mutant may take, and
 LEAST_S = 0.1  # that long anyway
 CAMPAIGNS = {"test_adversary", "test_robust", "test_e2e_errors"}  # seconds each: what they alone notice, no test of the module does
@@ -83,6 +87,16 @@ class Program:
         return {int(number) for number, verdict in verdicts.items() if verdict == "k"}
 
 
+def module_of(path: Path) -> str:
+    """What the table calls a file."""
+    return path.stem if path.suffix == ".c" else path.name
+
+
+def path_of(module: str) -> Path:
+    """The file of a module."""
+    return HEADERS / module if module.endswith(".h") else SOURCES / f"{module}.c"
+
+
 class Builder:
     """Makes libraries with mutants."""
 
@@ -93,32 +107,73 @@ class Builder:
 
     def library(self, source: Path, build: str) -> tuple[Path, Mutator, frozenset[int]]:
         """The library of a build with all mutants of one file, and which of them do not compile in it."""
-        place = self.folder / build / "mutants" / source.stem
-        place.mkdir(parents=True, exist_ok=True)
+        mutated = self.mutated(source, build)
+        mutated.parent.mkdir(parents=True, exist_ok=True)
         left_out: frozenset[int] = frozenset()
         while True:
-            mutator = Mutator(source.stem, source.read_text(), left_out)
-            (place / source.name).write_text(mutator.write())
-            bad = self.compile(place / source.name, build, "-fsyntax-only")
+            mutator = Mutator(module_of(source), source.read_text(), left_out)
+            mutated.write_text(mutator.write())
+            bad = self.refused(mutated, build)
             if not bad:
-                self.compile(place / source.name, build, "-c")
                 break
             if bad <= left_out:
-                raise RuntimeError(f"{place / source.name} does not compile without its mutants either")
+                raise RuntimeError(f"{mutated} does not compile without its mutants either")
             left_out |= bad
-        others = [path for path in (self.folder / build / "firmware/src").glob("*.o") if path.stem != source.stem]
+        place = self.place(source, build)
+        with_them = self.takers(source, build) if source.suffix == ".h" else {source: mutated}
+        objects = [self.compile(file, build, place / f"{path.stem}.o", place) for path, file in with_them.items()]
+        others = [path for path in (self.folder / build / SOURCES).glob("*.o") if SOURCES / f"{path.stem}.c" not in with_them]
         runtime = self.folder / build / "tests/mutation/runtime.o"
-        subprocess.run(["clang-19", "-shared", "-Wl,-Bsymbolic,-soname,libhg.so", "-o", place / "libhg.so", place / f"{source.stem}.o", *others, runtime], check=True)
+        subprocess.run(["clang-19", "-shared", "-Wl,-Bsymbolic,-soname,libhg.so", "-o", place / "libhg.so", *objects, *others, runtime], check=True)
         return place / "libhg.so", mutator, left_out
+
+    def place(self, source: Path, build: str) -> Path:
+        """Where the library with the mutants of a file is made."""
+        return self.folder / build / "mutants" / module_of(source)
+
+    def mutated(self, source: Path, build: str) -> Path:
+        """The file with its mutants; a header where it is found before the library's own."""
+        return self.place(source, build) / ("hullguard" if source.suffix == ".h" else "") / source.name
+
+    def takers(self, header: Path, build: str) -> dict[Path, Path]:
+        """The files of the library that take a header in, each as the file to compile."""
+        done = subprocess.run([*self.flags[build], "-MM", *map(str, sorted(SOURCES.glob("*.c")))], capture_output=True, encoding="utf-8", check=True)
+        rules = done.stdout.replace("\\\n", " ").splitlines()
+        files = [words.split()[1:] for words in rules]
+        return {Path(words[0]): Path(words[0]) for words in files if str(header) in words}
+
+    def programs(self, source: Path, build: str) -> list[Path]:
+        """Test programs; those that call functions of a header have its mutants in them, too."""
+        folder, place = self.folder / build, self.place(source, build)
+        paths = [path for path in sorted(folder.glob("test_*")) if os.access(path, os.X_OK) and not path.suffix and path.name not in CAMPAIGNS]
+        if source.suffix != ".h":
+            return paths
+        functions = {mutant.function for mutant in mutants_of(source)}
+        calls = {path: functions & set(re.findall(r"\w+", (UNIT / f"{path.name}.c").read_text(encoding="utf-8"))) for path in paths}
+        return [self.with_mutants(path, build, place) if calls[path] else path for path in paths]
+
+    def with_mutants(self, program: Path, build: str, place: Path) -> Path:
+        """A test program anew, compiled with the mutated header."""
+        test = self.compile(UNIT / f"{program.name}.c", build, place / f"{program.name}.o", place)
+        subprocess.run(["clang-19", "-rdynamic", "-o", place / program.name, test, program.parent / "libmodels.a", place / "libhg.so", "-lcmocka", "-lm"], check=True)
+        return place / program.name
 
     def compiled(self, source: Path, build: str) -> set[int]:
         """Numbers of the mutants that the preprocessor leaves in a build."""
-        text = subprocess.run([*self.flags[build], "-E", "-P", "-include", str(HERE / "runtime.h"), str(source)], capture_output=True, encoding="utf-8", check=True).stdout
+        command = [*self.flags[build], "-E", "-P", "-include", str(HERE / "runtime.h"), "-x", "c", str(self.mutated(source, build))]
+        text = subprocess.run(command, capture_output=True, encoding="utf-8", check=True).stdout
         return {int(number) for number in re.findall(r"hg_is_mutant\((\d+)U\)", text)}
 
-    def compile(self, source: Path, build: str, what: str) -> set[int]:
+    def compile(self, source: Path, build: str, target: Path, before: Path) -> Path:
+        """An object; `before` is where headers are looked for first."""
+        compiler, *flags = self.flags[build]
+        extra = ["-D_DEFAULT_SOURCE"] if source.parent == UNIT else []
+        subprocess.run([compiler, f"-I{before}", *flags, *extra, "-include", str(HERE / "runtime.h"), "-c", str(source), "-o", str(target)], check=True)
+        return target
+
+    def refused(self, source: Path, build: str) -> set[int]:
         """Numbers of the mutants that the compiler refuses."""
-        command = [*self.flags[build], "-ferror-limit=0", "-include", str(HERE / "runtime.h"), what, str(source), "-o", str(source.with_suffix(".o"))]
+        command = [*self.flags[build], "-ferror-limit=0", "-include", str(HERE / "runtime.h"), "-fsyntax-only", "-x", "c", str(source)]
         done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
         if done.returncode == 0:
             return set()
@@ -131,11 +186,10 @@ class Builder:
         return numbers
 
 
-def programs_of(folder: Path, module: str, library: Path) -> Iterator[tuple[Program, set[int], float]]:
-    """The test programs of a build, each with the mutants that it comes by and its time: those that are named after the module first, the quickest of them ahead."""
-    paths = sorted(path for path in folder.glob("test_*") if os.access(path, os.X_OK) and not path.suffix and path.name not in CAMPAIGNS)
+def programs_of(paths: list[Path], name: str, library: Path) -> Iterator[tuple[Program, set[int], float]]:
+    """The test programs of a build, each with the mutants that it comes by and its time: those that are named after the file first, the quickest of them ahead."""
     programs = {path: Program(path, library, library.parent) for path in paths}
-    named = [program for path, program in programs.items() if path.name.startswith(f"test_{module}")]
+    named = [program for path, program in programs.items() if path.name.startswith(f"test_{name}")]
     yield from sorted(((program, *program.reached()) for program in named), key=lambda found: found[2])
     yield from ((program, *program.reached()) for program in programs.values() if program not in named)
 
@@ -145,10 +199,10 @@ def judge(builder: Builder, source: Path, chosen: set[Key] | None) -> Verdicts:
     verdicts = Verdicts()
     for build in builder.builds:
         library, mutator, left_out = builder.library(source, build)
-        there = builder.compiled(library.parent / source.name, build) - left_out
+        there = builder.compiled(source, build) - left_out
         numbers = {mutant.number: mutant for mutant in mutator.mutants if mutant.number in there and (chosen is None or mutant.key in chosen)}
         verdicts.mutants |= numbers
-        for program, reached, seconds in programs_of(builder.folder / build, source.stem, library):
+        for program, reached, seconds in programs_of(builder.programs(source, build), source.stem, library):
             alive = {number for number in numbers if number not in verdicts.killer}
             if alive & reached:
                 killed = program.killed(alive & reached, seconds)
@@ -159,10 +213,10 @@ def judge(builder: Builder, source: Path, chosen: set[Key] | None) -> Verdicts:
 
 
 def drawn(sources: list[Path], unfinished: set[str], count: int, seed: int) -> dict[Path, set[Key] | None]:
-    """All mutants of the small files, and so many of the others, of a few files each time."""
+    """All mutants of the small files, and so many of the others, of a few files each time; a header counts as large, because most of the library is compiled for it."""
     random_ = random.Random(seed)
-    mutants = {path: mutants_of(path) for path in sources if path.stem not in unfinished}
-    chosen: dict[Path, set[Key] | None] = {path: None for path, found in mutants.items() if len(found) <= SMALL}
+    mutants = {path: mutants_of(path) for path in sources if module_of(path) not in unfinished}
+    chosen: dict[Path, set[Key] | None] = {path: None for path, found in mutants.items() if len(found) <= SMALL and path.suffix == ".c"}
     large = sorted(path for path in mutants if path not in chosen)
     files = random_.sample(large, min(FILES, len(large)))
     for path in files:
@@ -172,7 +226,7 @@ def drawn(sources: list[Path], unfinished: set[str], count: int, seed: int) -> d
 
 def mutants_of(source: Path) -> list[Mutant]:
     """Every mutant of a file, whether it compiles or not."""
-    mutator = Mutator(source.stem, source.read_text(encoding="utf-8"))
+    mutator = Mutator(module_of(source), source.read_text(encoding="utf-8"))
     mutator.write()
     return mutator.mutants
 
@@ -217,7 +271,7 @@ def faults_of(module: str, verdicts: Verdicts, table: Table, whole: bool) -> lis
         elif whole and len(unexplained) < table.pending[module]:
             faults.append(f"{module}: {len(unexplained)} unexplained survivors, fewer than the {table.pending[module]} that pending says: take the number down")
     else:
-        faults += [f"firmware/src/{module}.c:{m.line}: {m.operator} in {m.function}() survives\n    - {m.original}\n    + {m.mutated}" for m in unexplained]
+        faults += [f"{path_of(module)}:{m.line}: {m.operator} in {m.function}() survives\n    - {m.original}\n    + {m.mutated}" for m in unexplained]
     seen = {mutant.key for mutant in verdicts.mutants.values()}
     for key in table.reasons:
         if key[0] == module and key in seen and key not in survivors:
@@ -234,28 +288,31 @@ def main() -> int:
     parser.add_argument("builds", nargs="+")
     parser.add_argument("--results", type=Path, help="write what holds to this file")
     parser.add_argument("--sample", type=int, help="so many mutants of the larger files, drawn by HULLGUARD_SEED; all of the small ones")
-    parser.add_argument("--module", action="append", help="only this file")
+    parser.add_argument("--module", action="append", help="only this file: hull, linalg.h")
     arguments = parser.parse_args()
     builder = Builder(arguments.folder, arguments.builds)
     table = Table.read(HERE / "equivalent.toml")
-    sources = [path for path in sorted(Path("firmware/src").glob("*.c")) if not arguments.module or path.stem in arguments.module]
+    files = [*sorted(SOURCES.glob("*.c")), *(path for path in sorted(HEADERS.glob("*.h")) if mutants_of(path))]
+    sources = [path for path in files if not arguments.module or module_of(path) in arguments.module]
+    if len(sources) < len(set(arguments.module or ())):
+        sys.exit(f"choose of {', '.join(module_of(path) for path in files)}")
     chosen: dict[Path, set[Key] | None] = dict.fromkeys(sources)
     if arguments.sample:
         seed = int(os.environ.get("HULLGUARD_SEED", "0")) or int.from_bytes(os.urandom(4))
         print(f"HULLGUARD_SEED={seed}")
         chosen = drawn(sources, table.unfinished, arguments.sample, seed)
-    faults = [f"equivalent.toml: there is no firmware/src/{key[0]}.c" for key in table.reasons if not Path(f"firmware/src/{key[0]}.c").exists()]
+    faults = [f"equivalent.toml: there is no {path_of(key[0])}" for key in table.reasons if not path_of(key[0]).exists()]
     made = survived = 0
     for source, keys in sorted(chosen.items()):
         verdicts = judge(builder, source, keys)
-        found = faults_of(source.stem, verdicts, table, keys is None)
-        print(f"{source.stem}: {len(verdicts.mutants)} mutants, {len(verdicts.survivors)} survive, {len(found)} faults", flush=True)
+        found = faults_of(module_of(source), verdicts, table, keys is None)
+        print(f"{module_of(source)}: {len(verdicts.mutants)} mutants, {len(verdicts.survivors)} survive, {len(found)} faults", flush=True)
         faults += found
         made, survived = made + len(verdicts.mutants), survived + len(verdicts.survivors)
     for fault in faults:
         print(fault, file=sys.stderr)
     if not faults and arguments.results:
-        write_results(arguments.results, made, survived, sorted(path.stem for path in chosen), table)
+        write_results(arguments.results, made, survived, sorted(module_of(path) for path in chosen), table)
     return 1 if faults else 0
 
 

@@ -118,9 +118,48 @@ static void finite_finds_a_bad_number_at_every_place(void **state)
     }
 }
 
+static void a_list_out_of_order_is_found_at_every_place(void **state)
+{
+    (void)state;
+    uint8_t place[255];
+    for (uint8_t i = 0U; i < COUNT(place); i++) {
+        place[i] = i;
+    }
+    assert_true(hg_linalg_in_order(place, 255U));
+    assert_true(hg_linalg_in_order(place, 0U));
+    for (uint8_t i = 0U; i < COUNT(place); i++) {
+        place[i] = (uint8_t)(i + 1U);
+        assert_false(hg_linalg_in_order(place, 255U));
+        assert_true(hg_linalg_in_order(place, i));
+        place[i] = i;
+    }
+}
+
+/* The last codes that there are, and the first numbers behind them. */
+static void a_number_without_a_code_has_none(void **state)
+{
+    (void)state;
+    const hg_real last = (sizeof(hg_real) == 4U) ? R(nextafterf(2147483000.0F, 0.0F)) : R(nextafter(2147483000.0, 0.0));
+    assert_true(hg_real_to_code(last, R(1), 0) > 2147482000);
+    assert_true(hg_real_to_code(-last, R(1), 0) < -2147482000);
+    const hg_real none[] = {R(2147483000.0), R(3e9), R(1e30), HG_REAL_MAX, REAL_INF, REAL_NAN};
+    for (size_t i = 0U; i < COUNT(none); i++) {
+        assert_int_equal(INT32_MIN, hg_real_to_code(none[i], R(1), 0));
+        assert_int_equal(INT32_MIN, hg_real_to_code(-none[i], R(1), 0));
+        assert_int_equal(INT32_MIN, hg_real_to_code(none[i], R(2), 0));
+    }
+    assert_int_equal(INT32_MIN, hg_real_to_code(REAL_INF, R(0), 0));
+    assert_int_equal(0, hg_real_to_code(R(0), R(1), 0));
+}
+
 static void primitives_choose_and_measure(void **state)
 {
     (void)state;
+    assert_false(signbit(hg_real_abs(R(0))));
+    assert_true(hg_real_finite(HG_REAL_MAX));
+    assert_true(hg_real_finite(-HG_REAL_MAX));
+    assert_false(hg_real_finite(REAL_INF));
+    assert_false(hg_real_finite(-REAL_INF));
     assert_real(2.0, hg_real_abs(R(-2.0)));
     assert_real(2.0, hg_real_abs(R(2.0)));
     assert_real(3.0, hg_real_max(R(3.0), R(-4.0)));
@@ -160,6 +199,8 @@ int main(void)
         cmocka_unit_test(apply_takes_the_largest_shape),
         cmocka_unit_test(fits_notices_each_contradiction),
         cmocka_unit_test(finite_finds_a_bad_number_at_every_place),
+        cmocka_unit_test(a_list_out_of_order_is_found_at_every_place),
+        cmocka_unit_test(a_number_without_a_code_has_none),
         cmocka_unit_test(primitives_choose_and_measure),
         cmocka_unit_test(root_is_the_square_root),
     };

@@ -81,6 +81,7 @@ static void primitives_are_exact_or_nearest_at_every_edge(void **state)
         const int32_t a = edges[i];
         assert_int_equal(held((a < 0) ? -(wide)a : (wide)a), hg_real_abs(a));
         assert_int_equal((a != INT32_MIN) && (a != -INT32_MAX) && (a != INT32_MAX), hg_real_finite(a));
+        assert_int_equal(hg_real_finite(a) ? 0 : 1, hg_real_defect(a));
         for (size_t j = 0U; j < COUNT(edges); j++) {
             check_pair(a, edges[j]);
             check_scaled(a, edges[j]);
