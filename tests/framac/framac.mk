@@ -39,3 +39,8 @@ CHECK_PARTS += eva
 wp: ## contracts of kernels (Frama-C WP, z3); WP=ring: of one file in tests/framac/wp
 	@$(PY) tests/framac/wp.py $(BUILD)/results/wp.json $(FRAMAC)/wp $(WP)
 CHECK_PARTS += wp
+
+.PHONY: wp-deep
+wp-deep: ## the same, and those that take minutes
+	@$(PY) tests/framac/wp.py $(BUILD)/results/wp-deep.json $(FRAMAC)/wp-deep --deep
+DEEP_PARTS += wp-deep
