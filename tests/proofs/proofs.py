@@ -3,7 +3,8 @@
 A proof is a C function proof_X(), and what the comment before it says:
 
     @proves FUNCTION ..     of the library; every public function must be in some proof, or in exceptions.txt with a reason
-    @run check|deep real=f32|f64|q31 unwind=N limit=SECONDS [LOOP:N ..] [NAME=NUMBER ..]    once each; processor time; sizes are macros of the proof, or HG_* of the library
+    @run check|deep real=f32|f64|q31 unwind=N limit=SECONDS [LOOP:N ..] [NAME=NUMBER ..]    once each; processor time; sizes are macros of the proof, or HG_* of the library;
+                            NAME=FIRST..LAST is a run for each number
     @stub FUNCTION ..       calls of these go to stub_FUNCTION() of stubs.h in their place, which knows of them only what another proof shows: see contract.h
     @with CHECK ..          also this check of CBMC
     @without CHECK: WHY     without it
@@ -103,8 +104,19 @@ class Outcome:
         return " ".join((self.proof.name, self.run.real, *self.run.defines))
 
 
+def runs_of(words: Sequence[str], where: str) -> list[Run]:
+    """A line behind @run: one, or one for each number of its ranges."""
+    for i, word in enumerate(words):
+        if span := re.fullmatch(r"([A-Z_]+)=(\d+)\.\.(\d+)", word):
+            numbers = range(int(span[2]), int(span[3]) + 1)
+            if not numbers:
+                raise ProofError(f"{where}: @run has no number in '{word}'")
+            return [run for n in numbers for run in runs_of([*words[:i], f"{span[1]}={n}U", *words[i + 1 :]], where)]
+    return [run_of(words, where)]
+
+
 def run_of(words: Sequence[str], where: str) -> Run:
-    """A line behind @run."""
+    """A line behind @run, without ranges."""
     known: dict[str, str] = {}
     loops: list[str] = []
     defines: list[str] = []
@@ -138,7 +150,7 @@ def proof_of(source: Path, name: str, comment: str) -> Proof:
         elif tag == "@stub":
             stubs += rest.split()
         elif tag == "@run":
-            runs.append(run_of(rest.split(), where))
+            runs += runs_of(rest.split(), where)
         elif tag == "@with":
             checks += rest.split()
         elif tag == "@without":

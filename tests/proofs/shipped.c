@@ -14,7 +14,9 @@
  *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=platoon_bank ANY_NUMBERS ANY_SUMS
  *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=suspension ANY_NUMBERS ANY_SUMS
  *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=suspension_published ANY_NUMBERS ANY_SUMS
- *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS */
+ *  @run check real=f32 unwind=35 limit=90 write_reals.0:1000 MODEL=dc_motor ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=35 limit=600 write_reals.0:1000 MODEL=openacc NEWEST_ROW=0..9 ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=35 limit=600 write_reals.0:1000 MODEL=battery_pack NEWEST_ROW=0..32 ANY_NUMBERS ANY_SUMS */
 void proof_shipped_step(void)
 {
     const hg_detector_config *config = MODEL_CONFIG.detector;
@@ -27,6 +29,35 @@ void proof_shipped_step(void)
     if (finding.plant == HG_PLANT_CONFIRMED) {
         reach("an alarm");
     }
+}
+
+/** Every hull of a shipped model takes a sample at its own sizes, wherever the newest radii are, and is again one that samples can leave; J is not NaN and not infinite.
+ *  As above; the newest radii in the rows stated, each in turn.
+ *  @proves hg_hull_step hg_hull_valid
+ *  @run check real=f32 unwind=130 limit=90 MODEL=suspension NEWEST_ROW=0..1 ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=130 limit=90 MODEL=suspension_published NEWEST_ROW=120..120 ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=35 limit=90 MODEL=battery_pack NEWEST_ROW=0..1 ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=35 limit=300 MODEL=openacc NEWEST_ROW=0..9 ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=35 limit=300 MODEL=battery_pack NEWEST_ROW=0..32 ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=130 limit=300 MODEL=suspension NEWEST_ROW=0..120 ANY_NUMBERS ANY_SUMS
+ *  @run deep real=f32 unwind=130 limit=300 MODEL=suspension_published NEWEST_ROW=0..120 ANY_NUMBERS ANY_SUMS */
+void proof_shipped_hull(void)
+{
+    const hg_detector_config *config = MODEL_CONFIG.detector;
+    hg_hull *hull = state_hulls(config);
+    hg_real *radii = any_array(hg_real, HG_RING_REALS(config->width, config->history));
+    const hg_ring ring = {.data = radii, .width = config->width, .length = config->history, .newest = NEWEST_ROW};
+    assume(ring.newest < ring.length);
+    for (uint8_t g = 0U; g < config->generators; g++) {
+        const uint8_t residuals = config->hull[g].residuals;
+        hg_real *J = any_array(hg_real, residuals);
+        const hg_hull before = hull[g];
+        prove(hg_hull_valid(&config->hull[g], ring.width, ring.length), "valid tables");
+        hg_hull_step(&hull[g], &ring, J);
+        prove(ensures_hull_step(&hull[g], &before), "one sample on");
+        prove(J[residuals - 1U] <= HG_REAL_MAX, "a threshold");
+    }
+    reach("end");
 }
 
 /** Every hold, generator and bank of a shipped model takes a sample at its own sizes and is again one that samples can leave.

@@ -5,6 +5,11 @@
 
 #include "stubs.h"
 
+/* Row of the newest radii: any, or one that is a constant, which makes constants of all places of the past. */
+#ifndef NEWEST_ROW
+#define NEWEST_ROW any_u8()
+#endif
+
 /* No array has no place. */
 #define PLACES(n) (((n) > 0U) ? (n) : 1U)
 
@@ -102,7 +107,7 @@ static hg_detector any_detector(const hg_detector_config *config)
     hg_detector self = {.config = config,
                         .memory = {.hold = state_holds(config), .predict = state_predictors(config), .residual = state_residuals(config), .hull = state_hulls(config),
                                    .zonotope = state_zonotopes(config), .bank = state_banks(config), .alarm = state_alarms(config)},
-                        .radii = {.data = any_array(hg_real, HG_RING_REALS(config->width, config->history)), .width = config->width, .length = config->history, .newest = any_u8()},
+                        .radii = {.data = any_array(hg_real, HG_RING_REALS(config->width, config->history)), .width = config->width, .length = config->history, .newest = NEWEST_ROW},
                         .values = {.data = any_array(hg_real, HG_RING_REALS(config->signals, PLACES(config->window))), .width = config->signals, .length = config->window, .newest = any_u8()},
                         .value = any_array(hg_real, config->width), .r = any_array(hg_real, config->residuals), .J = any_array(hg_real, config->residuals),
                         .past = any_array(hg_real, config->width), .refusals = any_u32(), .samples = any_u8(), .beginnings = any_u32()};
