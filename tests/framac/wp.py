@@ -75,7 +75,7 @@ def annotate(case: Case, tree: Path) -> None:
         lines = target.read_text().splitlines()
         places = [number for number, text in enumerate(lines) if text.strip() == anchor]
         if len(places) <= (which or 0) or (len(places) > 1 and which is None):
-            sys.exit(f"{case.name}.acsl: '{anchor}' stands {len(places)} times in {file}; it must be there once, or as often as `first` to `eleventh` say")
+            sys.exit(f"{case.name}.acsl: '{anchor}' stands {len(places)} times in {file}; it must be there once, or as often as `{ORDINALS[0]}` to `{ORDINALS[-1]}` say")
         place = places[which or 0]
         lines[place:place] = block
         target.write_text("\n".join(lines) + "\n")

@@ -35,7 +35,7 @@ void proof_shipped_step(void)
  *  As above; the newest radii in the rows stated, each in turn.
  *  @proves hg_hull_step hg_hull_valid
  *  @run check real=f32 unwind=130 limit=90 MODEL=suspension NEWEST_ROW=0..1 ANY_NUMBERS ANY_SUMS
- *  @run check real=f32 unwind=130 limit=90 MODEL=suspension_published NEWEST_ROW=120..120 ANY_NUMBERS ANY_SUMS
+ *  @run check real=f32 unwind=130 limit=90 MODEL=suspension_published NEWEST_ROW=120U ANY_NUMBERS ANY_SUMS
  *  @run check real=f32 unwind=35 limit=90 MODEL=battery_pack NEWEST_ROW=0..1 ANY_NUMBERS ANY_SUMS
  *  @run deep real=f32 unwind=35 limit=300 MODEL=openacc NEWEST_ROW=0..9 ANY_NUMBERS ANY_SUMS
  *  @run deep real=f32 unwind=35 limit=300 MODEL=battery_pack NEWEST_ROW=0..32 ANY_NUMBERS ANY_SUMS
