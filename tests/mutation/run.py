@@ -293,9 +293,10 @@ def main() -> int:
     builder = Builder(arguments.folder, arguments.builds)
     table = Table.read(HERE / "equivalent.toml")
     files = [*sorted(SOURCES.glob("*.c")), *(path for path in sorted(HEADERS.glob("*.h")) if mutants_of(path))]
-    sources = [path for path in files if not arguments.module or module_of(path) in arguments.module]
-    if len(sources) < len(set(arguments.module or ())):
-        sys.exit(f"choose of {', '.join(module_of(path) for path in files)}")
+    known = {module_of(path): path for path in files}
+    if unknown := [module for module in arguments.module or () if module not in known]:
+        sys.exit(f"mutation: there is no file {', '.join(unknown)}; choose of {', '.join(known)}")
+    sources = [path for module, path in known.items() if not arguments.module or module in arguments.module]
     chosen: dict[Path, set[Key] | None] = dict.fromkeys(sources)
     if arguments.sample:
         seed = int(os.environ.get("HULLGUARD_SEED", "0")) or int.from_bytes(os.urandom(4))
