@@ -3,9 +3,9 @@
 
     wp.py RESULT WORK [--deep | CASE ..]    CASE: tests/framac/wp/CASE.acsl; without one all but those that take long, --deep: all
 
-A .acsl file: `file PATH`, `real f32|q31`, `functions NAME ..`, `goals N`, `deep` where they take long; then blocks, each `before TEXT` (a line of the source, blanks at its ends
-aside, that stands there once; `first TEXT` to `eleventh TEXT`: that of several; `in PATH` before it: of another file) and the annotation that goes before
-that line.
+A .acsl file: `file PATH`, `real f32|q31`, `functions NAME ..`, `take CASE ..` (what that case says of headers, proven there, holds here), `goals N`, `deep` where
+they take long; then blocks, each `before TEXT` (a line of the source, blanks at its ends aside, that stands there once; `first TEXT` to `eleventh TEXT`: that of
+several; `in PATH` before it: of another file) and the annotation that goes before that line.
 A number of goals that is not N is an error, so that none vanishes. Lemmas, which goals rest on, are proved as well, and count.
 """
 
@@ -27,6 +27,8 @@ Z3_OPTION = "smt.auto_config=false"  # where products meet quantifiers the tacti
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh")
 PROVED = re.compile(r"Proved goals:\s+(\d+) / (\d+)")
 
+Block = tuple[str, str, int | None, list[str]]  # file, the line it goes before, which of several such, annotation
+
 
 @dataclass
 class Case:
@@ -36,9 +38,10 @@ class Case:
     file: str = ""
     real: str = "f32"
     functions: list[str] = field(default_factory=list)
+    takes: list[str] = field(default_factory=list)
     goals: int = 0
     deep: bool = False
-    blocks: list[tuple[str, str, int | None, list[str]]] = field(default_factory=list)
+    blocks: list[Block] = field(default_factory=list)
 
 
 def read(path: Path) -> Case:
@@ -59,6 +62,8 @@ def read(path: Path) -> Case:
             case.real = rest
         elif key == "functions":
             case.functions += rest.split()
+        elif key == "take":
+            case.takes += rest.split()
         elif key == "goals":
             case.goals = int(rest)
         elif line == "deep":
@@ -68,9 +73,21 @@ def read(path: Path) -> Case:
     return case
 
 
-def annotate(case: Case, tree: Path) -> None:
+def taken(case: Case, known: dict[str, Case], before: frozenset[str] = frozenset()) -> list[Block]:
+    """Blocks of headers from the cases that this one takes, and from those that they take, each once."""
+    blocks: list[Block] = []
+    for name in case.takes:
+        if name not in known or name == case.name or name in before:
+            sys.exit(f"{case.name}.acsl: takes {name}, which is no other case, or takes this one")
+        other = known[name]
+        new = [*taken(other, known, before | {case.name}), *(block for block in other.blocks if block[0].endswith(".h"))]
+        blocks += [block for block in new if block not in blocks]
+    return blocks
+
+
+def annotate(case: Case, blocks: list[Block], tree: Path) -> None:
     """Put the contracts into the copy."""
-    for file, anchor, which, block in case.blocks:
+    for file, anchor, which, block in blocks:
         target = tree / file
         lines = target.read_text().splitlines()
         places = [number for number, text in enumerate(lines) if text.strip() == anchor]
@@ -104,12 +121,12 @@ def command_of(case: Case, include: Path, what: list[str]) -> list[str]:
     return [*command, "-wp", "-wp-rte", "-wp-prover", "z3", "-wp-timeout", str(TIMEOUT_S), "-wp-par", "1", "-wp-cache", "none", *what]
 
 
-def prove(case: Case, work: Path, env: dict[str, str]) -> bool:
+def prove(case: Case, known: dict[str, Case], work: Path, env: dict[str, str]) -> bool:
     """Run one case; print what is not proved."""
     tree = work / case.name
     shutil.rmtree(tree, ignore_errors=True)
     shutil.copytree(ROOT / "firmware", tree / "firmware", ignore=shutil.ignore_patterns("models", "apps", "examples", "zephyr"))
-    annotate(case, tree)
+    annotate(case, [*taken(case, known), *case.blocks], tree)
     include = tree / "firmware/include"
     source = tree / case.file
     if source.suffix == ".h":
@@ -145,7 +162,7 @@ def main() -> int:
     work.mkdir(parents=True, exist_ok=True)
     env = environment(work)
     cases = [known[name] for name in names]
-    good = [prove(case, work, env) for case in cases]
+    good = [prove(case, known, work, env) for case in cases]
     if not all(good):
         return 1
     goals, functions = sum(case.goals for case in cases), len({name for case in cases for name in case.functions})
