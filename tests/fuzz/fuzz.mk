@@ -23,6 +23,12 @@ $(FUZZ_TARGETS:%=$(FUZZ)/$(1)/%): $(FUZZ)/$(1)/%: $(FUZZ)/$(1)/tests/fuzz/fuzz_%
 endef
 $(foreach e,$(FUZZ_ENGINES),$(eval $(call fuzz_engine,$(e))))
 
+# Said before anything is compiled, and once.
+.PHONY: afl-there
+$(patsubst %.c,$(FUZZ)/afl/%.o,$(FUZZ_SRC) $(FUZZ_TARGETS:%=tests/fuzz/fuzz_%.c)): | afl-there
+afl-there:
+	@command -v afl-clang-fast >/dev/null || { echo "afl-clang-fast is missing: host_tools/setup.sh deep" >&2; exit 1; }
+
 fuzz_programs = $(foreach e,$(1),$(FUZZ_TARGETS:%=$(FUZZ)/$(e)/%))
 fuzz_run = PYTHONPATH=host_tools $(PY) tests/fuzz/fuzz.py --build $(FUZZ) $(1)
 

@@ -29,7 +29,8 @@ static hg_e2e_config any_config(const uint8_t *ids, const hg_e2e_limits *limits)
  *  @proves hg_e2e_protect hg_e2e_check hg_e2e_valid hg_e2e_modulus hg_e2e_owns
  *  @without conversion: checksums are cut to 8 and 16 bits on purpose
  *  @run deep real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P01
- *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P22
+ *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:33 LENGTH=3U PROFILE=HG_E2E_P22
+ *  @run deep real=f32 unwind=17 limit=150 hg_e2e_valid.0:33 LENGTH=4U PROFILE=HG_E2E_P22
  *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P05
  *  @run check real=f32 unwind=17 limit=150 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_NONE
  *  @run deep real=f32 unwind=17 limit=600 hg_e2e_valid.0:41 LENGTH=5U PROFILE=HG_E2E_P22

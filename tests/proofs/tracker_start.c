@@ -9,9 +9,9 @@
  *  @stub hg_fusion_valid hg_fusion_start hg_fusion_reset hg_fusion_open hg_consistency_start hg_consistency_reset
  *  @without conversion unsigned-overflow: bytes are cut on purpose, sample indices are meant to wrap
  *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=0U TESTS=1U ANY_SHARES
- *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=1U TESTS=0U ANY_SHARES
+ *  @run deep real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=1U TESTS=0U ANY_SHARES
  *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=1U TESTS=1U ANY_SHARES
- *  @run check real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=1U TESTS=2U ANY_SHARES */
+ *  @run deep real=f32 unwind=37 limit=90 hg_e2e_valid.0:65 STATES=6U SENSORS=5U DEPTH=2U VALID=1U TESTS=2U ANY_SHARES */
 void proof_tracker_start(void)
 {
     hg_tracker_config *config = any_tracker_config();
