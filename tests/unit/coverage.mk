@@ -2,7 +2,8 @@
 
 COVERAGE := $(BUILD)/coverage
 COVERAGE_BUILDS := $(FLOATS) $(UNIT_BUILDS)
-COVERAGE_CC = $(CLANG) -O1 -g
+# No folder of this machine in what is compiled: a copy of the tree can go on with it.
+COVERAGE_CC = $(CLANG) -O1 -g -ffile-compilation-dir=.
 INSTRUMENT  = -fprofile-instr-generate -fcoverage-mapping -fcoverage-mcdc
 
 .PHONY: coverage

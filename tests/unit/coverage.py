@@ -67,8 +67,8 @@ def add_conditions(seen: Covered, shown: str) -> None:
     decision = ""
     places: list[str] = []
     for line in shown.splitlines():
-        if line.startswith("/") and line.endswith(":"):
-            name = ours(line[:-1])
+        if match := re.fullmatch(r"([^\s|]+\.[ch]):", line):
+            name = ours(match[1])
         elif match := re.search(r"MC/DC Decision Region \((.*)\) to", line):
             decision, places = match[1], []
         elif match := re.search(r"Condition C\d+ --> \((.*)\)", line):
@@ -133,6 +133,8 @@ def main() -> int:
     if len(allowed) > table["most"]:
         faults.append(f"tests/unit/coverage.toml: {len(allowed)} places, more than the {table['most']} that it allows")
     shown = [1 for _, said in seen.conditions.values() if said != {"constant folded"}]
+    if not (seen.regions and seen.branches and shown):
+        faults.append(f"of {len(seen.regions)} places, {len(seen.branches)} branches and {len(shown)} conditions one is none: what llvm-cov says was not understood")
     lines = {(place[0], line) for place in seen.regions for line in range(place[1], place[3] + 1)}
     result = (
         f"{len(lines)} lines, {2 * len(seen.branches)} branch outcomes, {len(shown)} conditions in {len(arguments.builds)} builds ({', '.join(arguments.builds)}), "
