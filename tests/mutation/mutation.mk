@@ -2,7 +2,7 @@
 # make mutation-deep: all.
 
 MUTATION := $(BUILD)/mutation
-MUTATION_BUILDS := f32 q31 bare only
+MUTATION_BUILDS := f32 f64 q31 bare only
 MUTATION_CC = $(CLANG) -O1 -w -fPIC -ftrivial-auto-var-init=pattern
 MUTATION_TOOLS = $(wildcard tests/mutation/*.py tests/mutation/*.toml)
 
