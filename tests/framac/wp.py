@@ -170,11 +170,17 @@ def main() -> int:
     if sys.argv[3:] in ([], ["--deep"]):
         said = [
             "Saturating counters and the sums of fixed point stop at their ends, are exact inside them, and have no undefined behaviour, for any input",
-            "Rows times a vector, rings, slots and sensors of a fusion filter, checksums, seals, walks over tables, triggers, what a hold reads of its tables, and the taps, "
-            "modes and certificates of thresholds touch no memory but what their sizes say, whatever these are, and every loop ends",
+            "Rows times a vector, rings, residuals, slots and sensors of a fusion filter, checksums, seals, walks over tables, triggers, what a hold reads of its tables, the taps, "
+            "modes and certificates of thresholds, alarms and their causes, what a sender and a node do with each group, which inputs stand, freeze frames, the checks of observers' and of judges' tables, and the noise of a polynomial filter "
+            "touch no memory but what their sizes say, whatever these are, and every loop ends",
         ]
         if "--deep" in sys.argv:
-            said.append("The same of the check of a fusion filter's tables, its update and prediction, and of the columns of zonotopes")
+            said.append(
+                "The same of the checks of the tables of hulls, banks, predictions, frames' protection, detectors, nodes and fusion filters, of frames and their "
+                "protection, of predictions, of radii of the past, of a fusion filter's update and prediction, of the test of its sensors' consistency, of a tracker's "
+                "links and verdict, of the columns of zonotopes, of the regression of an isolation, and of the products, factors, means and moments of a polynomial "
+                "filter"
+            )
         write_to(result, [(promise, text) for promise in said])
     print(f"  ok  wp: {text}")
     return 0
