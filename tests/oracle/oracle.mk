@@ -5,7 +5,8 @@
 ORACLE       := tests/oracle
 ORACLE_BUILD := $(BUILD)/oracle
 ORACLE_EIGEN ?= /usr/include/eigen3
-ORACLE_CXX   := $(CXX) -std=c++17 -O1 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
+# clang compiles Eigen's templates in two thirds of the time that gcc takes.
+ORACLE_CXX   := $(CLANG:clang%=clang++%) -std=c++17 -O1 -ffp-contract=off -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror \
                 -isystem $(ORACLE_EIGEN) -Ifirmware/include $(DEPEND)
 ORACLE_TESTS := $(foreach r,$(FLOATS),$(patsubst $(ORACLE)/%.cpp,$(ORACLE_BUILD)/$(r)/%,$(wildcard $(ORACLE)/test_*.cpp)))
 ORACLE_ONCE  := $(patsubst %,$(ORACLE_BUILD)/%.o,oracle problem polynomial_oracle oracle_run)
