@@ -23,18 +23,23 @@ def share32(roundings: int) -> float:
 
 
 def mul(a: Array, b: Array) -> Array:
-    """A b, summed in index order."""
-    out = np.zeros((a.shape[0], b.shape[1]))
-    for i in range(a.shape[1]):
-        out += a[:, i, None] * b[None, i, :]
+    """A b, summed in index order; of stacks of matrices each with each, or all with the one."""
+    out = np.zeros((*np.broadcast_shapes(a.shape[:-2], b.shape[:-2]), a.shape[-2], b.shape[-1]))
+    for i in range(a.shape[-1]):
+        out += a[..., :, i, None] * b[..., None, i, :]
     return out
 
 
+def times(a: Array, x: Array) -> Array:
+    """A x, summed in index order; of each matrix of a stack."""
+    return np.ascontiguousarray(mul(a, x[:, None])[..., 0])
+
+
 def row_sums(a: Array) -> Array:
-    """Sum of each row, in index order."""
-    out = np.zeros(a.shape[0])
-    for i in range(a.shape[1]):
-        out += a[:, i]
+    """Sum of each row, in index order; of each matrix of a stack."""
+    out = np.zeros(a.shape[:-1])
+    for i in range(a.shape[-1]):
+        out += a[..., i]
     return out
 
 

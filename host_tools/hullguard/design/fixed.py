@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hullguard.design import uio_hull
-from hullguard.design.arith import mul, powers
+from hullguard.design.arith import mul, powers, times
 from hullguard.design.bank_types import BankTable
 from hullguard.design.hull import Fixed, Given, HullTables, Linear, build
 from hullguard.design.tables import FLOAT32, GeneratorTable, GroupTable, MismatchTable, ModalGeneratorTable, SignalTable, Tables, rows
@@ -328,7 +328,7 @@ def _ranges(lin: Linear, v: Array) -> tuple[Array, Array]:
     spectral = float(np.abs(np.linalg.eigvals(lin.state)).max())
     length = min(LENGTH_MAX, max(64, int(np.ceil(np.log(1e-9) / np.log(max(spectral, 0.05))))))
     entering = mul(np.abs(lin.input), v[:, None])
-    z = np.array([mul(np.abs(mul(p, lin.input)), v[:, None])[:, 0] for p in powers(np.eye(len(lin.state)), lin.state, length)]).sum(0)
+    z = times(np.abs(mul(powers(np.eye(len(lin.state)), lin.state, length), lin.input)), v).sum(0)
     # What is left of z after that many steps can be no larger than it ever was times what the power of G leaves.
     rest = float(np.abs(np.linalg.matrix_power(lin.state, length)).sum(1).max())
     if rest >= 1e-3:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -143,10 +143,10 @@ class FusionTables:
         """Loss rates that the tables know."""
         return len(self.table[0].relax)
 
-    @property
+    @cached_property
     def hash(self) -> int:
         """32 bits that change with any number above: host and node compare them."""
-        text = json.dumps(_plain(asdict(self)), sort_keys=True, separators=(",", ":"))
+        text = json.dumps(_plain(self), sort_keys=True, separators=(",", ":"))
         return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
 
 

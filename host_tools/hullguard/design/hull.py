@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hullguard.design.arith import digits, gamma32, mul, nearest32, powers, row_sums, share32, up32
+from hullguard.design.arith import digits, gamma32, mul, nearest32, powers, row_sums, share32, times, up32
 from hullguard.design.observer import SubPlant
 from hullguard.errors import InputError
 from hullguard.model.table import Array
@@ -112,7 +112,7 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
     Ly, Lu, Dy, Du = lin.input[:, :m], lin.input[:, m:], lin.direct[:, :m], lin.direct[:, m:]
     P = powers(np.eye(s), lin.state, lags)
     # Of |e|, the part that does not depend on radii: any initial state of the range, and the disturbances.
-    e = np.array([mul(np.abs(mul(p, T)), x) for p in P]).max(0) + np.array([row_sums(np.abs(mul(p, Bd))) for p in P]).sum(0)[:, None]
+    e = mul(np.abs(mul(P, T)), x).max(0) + row_sums(np.abs(mul(P, Bd))).sum(0)[:, None]
     z = mul(np.abs(T), x) + e
     into_e = mul(np.abs(mul(T, plant.A) - mul(lin.state, T) - mul(Ly, plant.C)), x) + mul(np.abs(mul(T, plant.B) - mul(Ly, plant.D) - Lu), u)
     meant = truth if truth is not None else np.zeros((lin.output.shape[0], T.shape[1]))
@@ -125,12 +125,12 @@ def rounding_of(lin: Linear, T: Array, plant: SubPlant, ranges: Ranges, Bd: Arra
         return Rounding(into_e[:, 0], into_r[:, 0], np.zeros((1, F.shape[0], width + more.shape[1])), np.zeros(F.shape[0]))
     # The part that does: |e(k)| <= sum over j of |G^j E| radius(k-1-j), and the value's own radius.
     none = np.zeros((s, more.shape[1]))
-    into_z = np.array([np.abs(np.hstack([mul(p, lin.input), mul(p, more)])) for p in P])
-    per_step = np.concatenate([np.hstack([E, none])[None], np.array([mul(G, w) for w in into_z])])[:lags]
-    FP = np.array([np.abs(mul(lin.output, p)) for p in P])
+    into_z = np.abs(mul(P, np.hstack([lin.input, more])))
+    per_step = np.concatenate([np.hstack([E, none])[None], mul(G, into_z)])[:lags]
+    FP = np.abs(mul(lin.output, P))
     weight = np.zeros((lags + 1, F.shape[0], width + more.shape[1]))
     weight[0, :, :width] = D
-    weight[1:] = np.array([mul(F, w) for w in into_z])
+    weight[1:] = mul(F, into_z)
     weight[1:] += _through(FP, per_step) if lags > LAGS_MAX else _lag_by_lag(FP, per_step)
     return Rounding(into_e[:, 0], into_r[:, 0], gamma * weight, gamma * mul(weight[-1], widest)[:, 0] * lags)
 
@@ -305,7 +305,7 @@ class Expected:
 
 def _start(lin: Linear, T: Array, F: Array, x: Array) -> Start:
     """From anywhere in |x(0)| <= x."""
-    added = np.array([mul(np.abs(mul(f, T)), x[:, None])[:, 0] for f in F])
+    added = times(np.abs(mul(F, T)), x)
     bound = _tail(lin, T)
     return Start(added, bound.output(len(F) + 1) * float((bound.input * x).sum()))
 
@@ -340,15 +340,15 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
     more = mul(T, given.derived)
     entering = np.hstack([lin.input, more])
     at_lag_0 = np.hstack([lin.direct, np.zeros((F.shape[1], more.shape[1]))])
-    response = np.concatenate([np.abs(at_lag_0)[None], np.abs(np.array([mul(f, entering) for f in F]))])
+    response = np.concatenate([np.abs(at_lag_0)[None], np.abs(mul(F, entering))])
     Bd = mul(T, plant.Ed) - mul(lin.input[:, :m], plant.Fd)
     Dd = mul(lin.direct[:, :m], plant.Fd)
     loss = rounding_of(lin, T, plant, ranges, Bd, more, min(length, LAGS_MAX), fixed)
     lags = loss.weight.shape[0]
     weights = response.copy()
     weights[:lags] += loss.weight
-    steps = np.array([mul(np.abs(f), loss.into_e[:, None])[:, 0] for f in F])
-    driven = (np.array([row_sums(np.abs(mul(f, Bd))) for f in F]) + steps).cumsum(0)
+    steps = times(np.abs(F), loss.into_e)
+    driven = (row_sums(np.abs(mul(F, Bd))) + steps).cumsum(0)
     at_once = row_sums(np.abs(Dd)) + loss.into_r
     rounding = steps.sum(0) + loss.into_r + loss.behind
     rest, moving = (_start(lin, T, F, x) for x in (ranges.initial, ranges.state))

@@ -6,7 +6,8 @@ import hashlib
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -265,7 +266,7 @@ class Tables:
         """hg_detector_sums()."""
         return sum(2 * b.certificates for b in self.banks)
 
-    @property
+    @cached_property
     def hash(self) -> int:
         """32 bits that change with any number above: host and node compare them."""
         if self.float_hash is not None:
@@ -281,7 +282,7 @@ class Tables:
 def _plain(value: Any) -> Any:
     """Data with every float as its exact hexadecimal text."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {k: _plain(v) for k, v in asdict(value).items()}
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
