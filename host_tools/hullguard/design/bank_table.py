@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hullguard.design.arith import digits, gamma32, mul, nearest32, row_sums, up32
+from hullguard.design.arith import digits, gamma32, mul, nearest32, row_sums, times, up32
 from hullguard.design.bank_types import BankTable, StoredBank
 from hullguard.design.reach import largest
 from hullguard.design.store import Stored
@@ -57,7 +57,7 @@ def bank_table(model: Model, stored: Stored, bank: StoredBank, varying: Varying 
     gamma, widen = gamma32(terms), widened(terms)
     values = _values(model, stored, bank)
     bias = _healthy(model, form, weight, _states(model, stored, bank, fault_size), values[model.inputs])
-    bias += gamma * mul(np.abs(weight).reshape(len(weight), -1), np.tile(values, bank.window)[:, None])[:, 0]
+    bias += gamma * times(np.abs(weight).reshape(len(weight), -1), np.tile(values, bank.window))
     bias = (bias + _left(model, bank, form, weight, fault_size)) * (1 + gamma) * DOUBLE
     if not np.all(np.isfinite(bias)):
         cure = "give plant.state_range" if bank.hypothesis is None else "give [plant] feedback with a stable loop, which bounds what a fault can do"
@@ -94,7 +94,7 @@ def _healthy(model: Model, form: WindowForm, weight: Array, state: Array, inputs
     seen = np.abs(mul(w, form.O))
     # A state that a certificate does not see at all may be unbounded.
     initial = row_sums(seen * np.where(seen > 0, state, 0.0))
-    return initial + row_sums(np.abs(mul(w, form.Md))) + mul(np.abs(mul(w, form.Mu) + w_u), np.tile(inputs, form.window)[:, None])[:, 0]
+    return initial + row_sums(np.abs(mul(w, form.Md))) + times(np.abs(mul(w, form.Mu) + w_u), np.tile(inputs, form.window))
 
 
 def _states(model: Model, stored: Stored, bank: StoredBank, size: float) -> Array:

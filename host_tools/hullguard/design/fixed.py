@@ -262,9 +262,9 @@ def _modal(g: GeneratorTable, u: Modal, units: Array, values: Array, where: str)
     if t.mode_decay.shape != u.tables.mode_decay.shape:
         raise InputError(f"{where}: not for fixed point: rounded tables have other modes than the exact ones; spread the poles")
     start = np.maximum(t.mode_rest, t.mode_moving)
-    M = 2.0 ** np.array([unit_of((x or 1.0) * MARGIN, f"{where}: a mode of its radii") for x in start + mul(t.mode_input, V[:, None])[:, 0] / (1 - t.mode_decay)])
+    M = 2.0 ** np.array([unit_of((x or 1.0) * MARGIN, f"{where}: a mode of its radii") for x in start + times(t.mode_input, V) / (1 - t.mode_decay)])
     # A theta rounds two products a sample, half a step each.
-    own = mul(t.mode_output, (M * STEP / (1 - t.mode_decay))[:, None])[:, 0] * (1 + 1e-6)
+    own = times(t.mode_output, M * STEP / (1 - t.mode_decay)) * (1 + 1e-6)
     weight, into, out = t.weight * V / R[:, None], t.mode_input * V / M[:, None], t.mode_output * M / R[:, None]
     summed = _exponent(np.concatenate([weight.sum((0, 2)) + out.sum(1), into.sum(1)]), where)
     made = ModalGeneratorTable(
@@ -296,9 +296,9 @@ def _modal(g: GeneratorTable, u: Modal, units: Array, values: Array, where: str)
 
 def _widest(t: uio_hull.ModalTables, V: Array) -> Array:
     """The largest radii of estimates, after any radii of signals within +-V. A theta moves on once before it is first read."""
-    theta = np.maximum(t.mode_rest, t.mode_moving) * t.mode_decay + mul(t.mode_input, V[:, None])[:, 0] / (1 - t.mode_decay)
+    theta = np.maximum(t.mode_rest, t.mode_moving) * t.mode_decay + times(t.mode_input, V) / (1 - t.mode_decay)
     bias = np.max(np.vstack([t.rest, t.moving, t.bias]), axis=0)
-    return np.asarray((t.weight * V).sum((0, 2)) + mul(t.mode_output, theta[:, None])[:, 0] + bias)
+    return np.asarray((t.weight * V).sum((0, 2)) + times(t.mode_output, theta) + bias)
 
 
 def _check_radii(g: ModalGeneratorTable, where: str) -> None:
@@ -306,7 +306,7 @@ def _check_radii(g: ModalGeneratorTable, where: str) -> None:
     scale, decay = 2.0 ** g.exponents[2], np.array(g.mode_decay)
     start, later = np.maximum(g.mode_rest, g.mode_moving), (scale * np.array(g.mode_input).sum(1) + STEP) / (1 - decay)
     bias = np.max(np.vstack([g.rest, g.moving, g.bias]), axis=0)
-    radius = scale * (np.array(g.weight).sum((0, 2)) + mul(np.array(g.mode_output), (start * decay + later + STEP)[:, None])[:, 0]) + bias + STEP
+    radius = scale * (np.array(g.weight).sum((0, 2)) + times(np.array(g.mode_output), start * decay + later + STEP)) + bias + STEP
     if np.any(start + later >= LARGEST) or np.any(radius >= LARGEST):
         raise InputError(f"{where}: not for fixed point: rounded tables of its radii leave the range of the exact ones")
 
@@ -334,7 +334,7 @@ def _ranges(lin: Linear, v: Array) -> tuple[Array, Array]:
     if rest >= 1e-3:
         raise InputError("the generator forgets too slowly for fixed point: choose poles further inside the unit circle")
     z = z + rest / (1 - rest) * z.max() + 1e-12 * entering.max()
-    return z, mul(np.abs(lin.output), z[:, None])[:, 0] + mul(np.abs(lin.direct), v[:, None])[:, 0]
+    return z, times(np.abs(lin.output), z) + times(np.abs(lin.direct), v)
 
 
 def _check(lin: Linear, v: Array, Z: Array, R: Array, where: str) -> None:

@@ -6,8 +6,6 @@ everywhere.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,7 +34,7 @@ from hullguard.design.fusion import (
 )
 from hullguard.design.protection import own_protection
 from hullguard.design.store import HEADER, opened, path_of
-from hullguard.design.tables import EXTENDED, FLOAT32, SIGNED, MessageTable, SignalTable, _plain
+from hullguard.design.tables import EXTENDED, FLOAT32, SIGNED, MessageTable, SignalTable, hash_of, plain_of
 from hullguard.errors import InputError
 from hullguard.model.fusion import FusionModel, FusionSensor, _next
 from hullguard.model.schema import Frame
@@ -146,8 +144,7 @@ class FusionTables:
     @cached_property
     def hash(self) -> int:
         """32 bits that change with any number above: host and node compare them."""
-        text = json.dumps(_plain(self), sort_keys=True, separators=(",", ":"))
-        return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
+        return hash_of(plain_of(self))
 
 
 @dataclass(frozen=True)

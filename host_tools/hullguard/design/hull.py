@@ -366,7 +366,7 @@ def build(lin: Linear, given: Given, where: str, fixed: Fixed | None = None) -> 
     # What rounding adds to the lags behind the taps is no impulse response: it goes into the constant, with radii as wide as the ranges.
     widest = np.concatenate([2 * ranges.value, ranges.derived])
     behind = np.array([loss.weight[t:, :, g].sum(0) for g, t in enumerate(taps)]).T
-    late = mul(behind, widest[:, None])[:, 0]
+    late = times(behind, widest)
     at_once, rounding = at_once + loss.behind + late, rounding + late
     if fixed:  # a threshold rounds its sum, and a tail two products a sample
         own = fixed.residual * (1 + 1 / (1 - decay))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hullguard.design.arith import mul, row_sums, share32, up32
+from hullguard.design.arith import mul, row_sums, share32, times, up32
 from hullguard.design.tables import MismatchTable, rows
 from hullguard.model.schema import Model
 from hullguard.model.table import Array
@@ -34,7 +34,7 @@ def mismatch(model: Model, state: Array) -> tuple[Array, Array, Array]:
             Dy[:, row] += plant.dA[:, j] / scale
             d0 += plant.dA[:, j] * row_sums(np.abs(plant.Fd[[row]]))[0] / scale
     noise = np.array([model.signals[i].noise for i in model.inputs])
-    return d0 + mul(plant.dB, noise[:, None])[:, 0], Dy, plant.dB.copy()
+    return d0 + times(plant.dB, noise), Dy, plant.dB.copy()
 
 
 def mismatch_table(model: Model, state: Array) -> tuple[MismatchTable, tuple[int, ...]]:

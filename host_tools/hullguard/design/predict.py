@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hullguard.design.arith import gamma32, mul, nearest32, row_sums, up32
+from hullguard.design.arith import gamma32, mul, nearest32, row_sums, times, up32
 from hullguard.design.tables import GroupTable, PredictTable, rows
 from hullguard.errors import InputError
 from hullguard.model.plant import Plant
@@ -124,10 +124,10 @@ class _Rounded:
 
     def correcting(self, e: Array) -> Array:
         """The same of a frame: noise, quantisation, rounding."""
-        y = mul(np.abs(self.C), self.bounds.state[:, None])[:, 0] + row_sums(np.abs(self.Fd)) + self.half
-        off = mul(np.abs(self.Cr - self.C), self.bounds.state[:, None])[:, 0] + self.gamma * (2 * y + mul(np.abs(self.Cr), e[:, None])[:, 0])
-        innovation = mul(np.abs(self.Cr), e[:, None])[:, 0] + y
-        rounding = self.gamma * (mul(np.abs(self.S), innovation[:, None])[:, 0] + self.bounds.state + e)
+        y = times(np.abs(self.C), self.bounds.state) + row_sums(np.abs(self.Fd)) + self.half
+        off = times(np.abs(self.Cr - self.C), self.bounds.state) + self.gamma * (2 * y + times(np.abs(self.Cr), e))
+        innovation = times(np.abs(self.Cr), e) + y
+        rounding = self.gamma * (times(np.abs(self.S), innovation) + self.bounds.state + e)
         return np.hstack([mul(self.S, self.Fd), self.S * (self.half + off), np.diag(rounding)])
 
     @property
@@ -145,17 +145,17 @@ def _hidden(t: _Rounded, horizon: int) -> tuple[int | None, Array]:
     QA = np.abs(mul(Q, t.A))
     PAP, PAQ = np.abs(mul(mul(P, t.A), P)), np.abs(mul(mul(P, t.A), Q))
     X = t.bounds.state
-    hidden, seen = mul(np.abs(P), X[:, None])[:, 0], np.tile(mul(np.abs(Q), X[:, None])[:, 0], (horizon + 1, 1))
+    hidden, seen = times(np.abs(P), X), np.tile(times(np.abs(Q), X), (horizon + 1, 1))
     trail = [hidden]
     for _ in range(SETTLE_MAX):
         e = hidden + seen.max(0)
         entering, correcting = t.entering(e), row_sums(np.abs(t.correcting(e)))
         # A frame leaves h as it is but for S's own rounding: P S is not quite 0.
-        kept = hidden + mul(np.abs(P), correcting[:, None])[:, 0] + mul(np.abs(mul(P, Q)), seen.max(0)[:, None])[:, 0]
-        fresh = mul(np.abs(Q), correcting[:, None])[:, 0] + mul(np.abs(mul(Q, P)), hidden[:, None])[:, 0]
+        kept = hidden + times(np.abs(P), correcting) + times(np.abs(mul(P, Q)), seen.max(0))
+        fresh = times(np.abs(Q), correcting) + times(np.abs(mul(Q, P)), hidden)
         seen[0] = fresh
-        seen[1:] = np.array([mul(QA, (kept + s)[:, None])[:, 0] for s in seen[:-1]]) + row_sums(np.abs(mul(Q, entering)))
-        hidden = mul(PAP, kept[:, None])[:, 0] + mul(PAQ, seen.max(0)[:, None])[:, 0] + row_sums(np.abs(mul(P, entering)))
+        seen[1:] = np.array([times(QA, kept + s) for s in seen[:-1]]) + row_sums(np.abs(mul(Q, entering)))
+        hidden = times(PAP, kept) + times(PAQ, seen.max(0)) + row_sums(np.abs(mul(P, entering)))
         trail.append(hidden)
         if not np.all(np.isfinite(hidden)) or hidden.max() > 1e6 * max(1.0, float(X.max())):
             return None, hidden
@@ -172,9 +172,9 @@ def _radii(t: _Rounded, hidden: Array, horizon: int) -> Array:
     X = t.bounds.state
     e = hidden + row_sums(np.abs(t.correcting(hidden)))  # after a frame, for the rounding only; it grows from here on
     for _ in range(horizon):
-        e = np.maximum(e, mul(np.abs(t.A), e[:, None])[:, 0] + row_sums(np.abs(t.entering(e))))
+        e = np.maximum(e, times(np.abs(t.A), e) + row_sums(np.abs(t.entering(e))))
     start, entering = np.hstack([np.diag(hidden), t.correcting(e)]), t.entering(e)
-    at_once = mul(np.abs(t.C - t.Cr), X[:, None])[:, 0] + row_sums(np.abs(t.Fd)) + t.gamma * mul(np.abs(t.Cr), (X + e)[:, None])[:, 0]
+    at_once = times(np.abs(t.C - t.Cr), X) + row_sums(np.abs(t.Fd)) + t.gamma * times(np.abs(t.Cr), X + e)
     through, steps, out = t.Cr, np.zeros(t.Cr.shape[0]), []
     for _ in range(horizon):
         steps = steps + row_sums(np.abs(mul(through, entering)))

@@ -271,22 +271,27 @@ class Tables:
         """32 bits that change with any number above: host and node compare them."""
         if self.float_hash is not None:
             return self.float_hash
-        plain = _plain(replace(self, fixed=None, not_fixed=""))
+        plain = plain_of(replace(self, fixed=None, not_fixed=""))
         for part in ("polynomials", "freeze"):
             if not plain[part]:
                 del plain[part]  # a model without it is what it was before there were any
-        text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
-        return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
+        return hash_of(plain)
 
 
-def _plain(value: Any) -> Any:
+def hash_of(plain: Any) -> int:
+    """32 bits of plain data."""
+    text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
+
+
+def plain_of(value: Any) -> Any:
     """Data with every float as its exact hexadecimal text."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: plain_of(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
+        return {k: plain_of(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
+        return [plain_of(v) for v in value]
     return value.hex() if isinstance(value, float) else value
 
 
