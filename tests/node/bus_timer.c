@@ -92,8 +92,8 @@ static int send_ticks(uint64_t period_us, uint64_t ticks, uint64_t drop)
             }
         }
     }
-    (void)printf("ticks %" PRIu64 "\nmeasurement %" PRIu64 "\ncontrol %" PRIu64 "\ndropped %" PRIu64 "\nlate_us %" PRIu64 "\n", ticks,
-                 frames[HG_PLATOON_GROUP_MEASUREMENT], frames[HG_PLATOON_GROUP_CONTROL], dropped, worst_us);
+    (void)printf("begin_us %" PRIu64 "\nticks %" PRIu64 "\nmeasurement %" PRIu64 "\ncontrol %" PRIu64 "\ndropped %" PRIu64 "\nlate_us %" PRIu64 "\n",
+                 begin_us, ticks, frames[HG_PLATOON_GROUP_MEASUREMENT], frames[HG_PLATOON_GROUP_CONTROL], dropped, worst_us);
     return EXIT_SUCCESS;
 }
 

@@ -11,8 +11,26 @@ from pathlib import Path
 import pytest
 from node_support import BUS_TIMER, HERE, NODE, SEED, environment, in_guest
 
-TICKS = {"steady": (6000, 0), "dropped": (500, 100)}
+TICKS = {"steady": (6000, 0), **{f"dropped{i}": (500, 100) for i in range(3)}}  # ticks; every how many one is dropped
 _started: list[tuple[subprocess.Popen[str], Path]] = []
+RUNS_MAX = 3
+GAPS_MAX = 0.03  # of the reference's own wake-ups: with more, the machine has no time for a real-time test beside what it does
+
+
+def start_timing() -> None:
+    """Both ends and the reference, in a guest of their own."""
+    out = Path(tempfile.mkdtemp(prefix="hullguard-timing-"))
+    runs = [f"{name}:{ticks}:{drop}" for name, (ticks, drop) in TICKS.items()]
+    command = in_guest("sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=300)
+    _started.append((subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment()), out))
+
+
+def was_calm(out: Path) -> bool:
+    """Did the reference, which is no part of what is tested, wake up in time nearly always?"""
+    lines = [line.split() for name in TICKS for line in (out / f"{name}.watch").read_text().splitlines()]
+    gaps, wakes = sum(words[:2] == ["gap", "wake"] for words in lines), sum(int(words[1]) for words in lines if words[0] == "wakes")
+    print(f"{gaps} of {wakes} wake-ups of the reference were late by half a period")
+    return gaps <= GAPS_MAX * wakes
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -25,10 +43,7 @@ def pytest_report_header() -> str:
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     if not session.config.option.collectonly and any("timing_files" in getattr(item, "fixturenames", ()) for item in session.items):
-        out = Path(tempfile.mkdtemp(prefix="hullguard-timing-"))
-        runs = [f"{name}:{ticks}:{drop}" for name, (ticks, drop) in TICKS.items()]
-        command = in_guest("sh", HERE / "timing.sh", out, NODE["f32"], BUS_TIMER, *runs, timeout_s=300)
-        _started.append((subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment()), out))
+        start_timing()
 
 
 def pytest_sessionfinish() -> None:
@@ -43,10 +58,14 @@ def pytest_sessionfinish() -> None:
 
 @pytest.fixture(scope="session")
 def timing_files() -> Iterator[Path]:
-    """Folder with the files of the runs in real time."""
-    process, out = _started[0]
-    said, _ = process.communicate(timeout=330)
-    assert process.returncode == 0, f"exit status {process.returncode}: {said}"
+    """Folder with the files of the runs in real time. Runs in which the machine had no time are made again, now that no other test runs beside."""
+    for last in range(RUNS_MAX):
+        process, out = _started[-1]
+        said, _ = process.communicate(timeout=330)
+        assert process.returncode == 0, f"exit status {process.returncode}: {said}"
+        if was_calm(out) or last == RUNS_MAX - 1:
+            break
+        start_timing()
     yield out
 
 

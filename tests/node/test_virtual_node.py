@@ -4,6 +4,7 @@ silent becomes a bit of bus health. Expected times are worked out from node.h an
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,7 +121,8 @@ def test_a_closing_frame_that_came_while_the_node_was_held_up_is_not_late(tmp_pa
 def test_lost_closing_frames_are_overdue_one_by_one(count: int, tmp_path: Path) -> None:
     first, samples = 30, 80
     script = Script.of(samples, lost=lambda k, closing: closing and first <= k < first + count)
-    ran = script.run(tmp_path, "--samples", samples)
+    ran = script.run(tmp_path, "--samples", samples, "--health", tmp_path / "health")
+    assert re.findall(r"^control.*\blost[ =](\d+)", (tmp_path / "health").read_text(), re.M) == [str(count)]
     assert ran.misses == [(k, FIRST + k * T + SLACK, FIRST + k * T + SLACK) for k in range(first, first + count)]
     # The closing group is periodic: its first absence is a loss, known at the deadline and said at once.
     table = script.drive.native.tables.groups[script.drive.native.tables.closing]

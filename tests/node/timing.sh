@@ -9,9 +9,9 @@ for run in "$@"; do
     n=$!
     "$timer" watch 10000 >"$out/$name.watch" &
     w=$!
-    sleep 0.4
+    until grep -q ready "$out/$name.node" && grep -q ready "$out/$name.watch"; do sleep 0.1; done
     "$timer" send 10000 "${rest%%:*}" "${rest#*:}" >"$out/$name.send"
-    sleep 0.1
+    sleep 1 # both have read what was sent
     kill -TERM $n $w
     wait $n
     wait $w
